@@ -182,7 +182,7 @@ fn ours(
         let positions = shapes[i % shapes.len()].clone();
         let normals = normals(&positions, &mesh.topology.triangles);
         let solid =
-            Solid::new(Arc::new(Mesh { positions, normals, topology: Arc::clone(&mesh.topology) }));
+            Solid::new(Arc::new(Mesh::of(positions, normals, Arc::clone(&mesh.topology))));
         likelihood(&placed(&solid, &poses[i % poses.len()]));
     });
     Ok(())

@@ -295,7 +295,7 @@ fn meshes_of_any_numbers_are_drawn() {
             part_count: 1,
             ..Topology::default()
         };
-        Solid::new(Arc::new(Mesh { positions, normals, topology: Arc::new(topology) }))
+        Solid::new(Arc::new(Mesh::of(positions, normals, Arc::new(topology))))
     };
     let odd = [
         f32::NAN,

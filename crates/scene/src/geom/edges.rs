@@ -122,7 +122,7 @@ fn build(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u16]) -> Option<Me
         edges,
         ..Topology::default()
     };
-    Some(Mesh { positions: out_positions, normals: out_normals, topology: Arc::new(topology) })
+    Some(Mesh::of(out_positions, out_normals, Arc::new(topology)))
 }
 
 /// Returns a normal for each vertex of a surface without creases: the area-weighted mean

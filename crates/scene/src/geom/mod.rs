@@ -6,6 +6,7 @@
 mod affine;
 pub mod armature;
 mod bounds;
+mod clusters;
 mod cuboid;
 mod detail;
 mod edges;
@@ -28,6 +29,8 @@ mod sphere;
 
 pub use affine::Affine;
 pub use bounds::Bounds;
+pub use clusters::Clusters;
+pub(crate) use clusters::{Faces, Few, LEAF, Node, Shape, Trees, WIDE};
 pub use cuboid::{cuboid, vjp_cuboid};
 pub use detail::{Coarse, Detail};
 pub use error::GeomError;

@@ -61,7 +61,7 @@ pub(super) fn revolve(strips: &[Strip], sides: u32, closed: bool, part_count: u1
             }
         }
     }
-    Mesh { positions, normals, topology }
+    Mesh::of(positions, normals, topology)
 }
 
 /// The unit normal of a ring, away from the axis and along it, from the points before and

@@ -538,7 +538,7 @@ impl Solid {
             Arc::make_mut(&mut mesh.topology).part_names = t.part_names;
             return Ok(mesh);
         }
-        Ok(Mesh { positions, normals, topology: Arc::new(t) })
+        Ok(Mesh::of(positions, normals, Arc::new(t)))
     }
 }
 

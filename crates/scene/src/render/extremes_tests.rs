@@ -95,7 +95,7 @@ fn raw(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Solid {
         part_count: 1,
         ..Topology::default()
     };
-    Solid::new(Arc::new(Mesh { positions, normals, topology: Arc::new(topology) }))
+    Solid::new(Arc::new(Mesh::of(positions, normals, Arc::new(topology))))
 }
 
 #[test]

@@ -14,6 +14,7 @@ mod image_bounds;
 mod lines;
 mod pixels;
 mod revolution;
+mod rigid;
 mod view;
 mod work;
 

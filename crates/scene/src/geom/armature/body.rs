@@ -370,7 +370,7 @@ impl Armature {
             normals
                 .push(Vec3::from((cofactor(&m.matrix3) * Vec3A::from(n)).normalize_or(Vec3A::Y)));
         }
-        let mesh = Arc::new(Mesh { positions, normals, topology: Arc::clone(&part.topology) });
+        let mesh = Arc::new(Mesh::of(positions, normals, Arc::clone(&part.topology)));
         let detail = Detail::posed(Arc::clone(&self.skin) as Arc<dyn Levels>, number);
         Instance {
             mesh,

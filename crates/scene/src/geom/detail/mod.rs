@@ -37,7 +37,7 @@ impl Coarse {
             vertices.iter().filter_map(|v| list.get(*v as usize)).copied().collect()
         };
         let (positions, normals) = (pick(&mesh.positions), pick(&mesh.normals));
-        Coarse { mesh: Arc::new(Mesh { positions, normals, topology }), vertices }
+        Coarse { mesh: Arc::new(Mesh::of(positions, normals, topology)), vertices }
     }
 }
 

@@ -231,7 +231,7 @@ fn parts_of_a_body_still_meet() {
         for ((own, topology), levels) in parts.iter().zip(&all) {
             let pick = |list: &[Vec3]| own.iter().map(|v| list[*v as usize]).collect::<Vec<_>>();
             let (positions, normals) = (pick(&mesh.positions), pick(&normals));
-            let part = Mesh { positions, normals, topology: Arc::new(topology.clone()) };
+            let part = Mesh::of(positions, normals, Arc::new(topology.clone()));
             let coarse = levels[k].of(&part).mesh;
             let name = |v: u32| own[levels[k].vertices[v as usize] as usize];
             faces.extend(coarse.topology.triangles.iter().map(|t| t.map(name)));
@@ -251,7 +251,7 @@ fn poor_meshes_do_no_harm() {
             part_count: 1,
             ..Topology::default()
         };
-        Mesh { normals: vec![Vec3::Y; positions.len()], positions, topology: Arc::new(topology) }
+        Mesh::of(positions.clone(), vec![Vec3::Y; positions.len()], Arc::new(topology))
     };
     let mut state = 1u32;
     let mut random = |n: u32| {

@@ -13,6 +13,9 @@ use crate::render::lines::extraction::{Room, extract_mesh};
 use crate::render::lines::visibility::{Depths, Piece};
 use crate::render::pixels::project::{DepthRange, Placement, Projected, project};
 use crate::render::pixels::sparse_depth::SparseDepth;
+use crate::render::rigid::hiding::Hiding;
+use crate::render::rigid::pieces::{Found, extract_posed};
+use crate::render::rigid::{Posed, posed};
 use crate::render::{Camera, work};
 use std::cell::RefCell;
 
@@ -21,7 +24,9 @@ use std::cell::RefCell;
 struct Scratch {
     projected: Projected,
     room: Room,
+    found_faces: Found,
     looked: SparseDepth,
+    hiding: Hiding,
     /// Pieces, hidden or not.
     pieces: Vec<Piece>,
     hidden: Vec<bool>,
@@ -40,39 +45,23 @@ impl Contours {
             return Contours::of_revolution(&r.surface, &r.affine, camera);
         }
         with_scratch(|scratch| {
-            let range = scratch.trace(solid, camera);
-            let Scratch { projected, looked, pieces, hidden, found, .. } = scratch;
-            hidden.clear();
-            hidden.resize(pieces.len(), true);
-            // Most pieces pass their first test: only the others need the second one.
-            for side in 0..2 {
-                let pixels = || {
-                    hidden
-                        .iter()
-                        .zip(&*pieces)
-                        .filter(|(hidden, _)| **hidden)
-                        .filter_map(|(_, p)| p.pixel(side))
-                };
-                if pixels().next().is_none() {
-                    break;
-                }
-                looked.clear(camera);
-                pixels().for_each(|pixel| looked.mark(pixel));
-                let depth = looked.draw(solid, camera, projected);
-                let Some(depths) = Depths::new(depth, camera.width, camera.height, range.extent())
-                else {
-                    break;
-                };
-                for (hidden, piece) in hidden.iter_mut().zip(&*pieces) {
-                    *hidden = *hidden && !depths.visible_by(piece, side);
-                }
+            if let Some(posed) = posed(solid, camera) {
+                return scratch.of_posed(&posed, camera);
             }
-            seen(
-                pieces.iter().zip(hidden).filter(|(_, hidden)| !**hidden).map(|(piece, _)| piece),
-                camera,
-                found,
-            )
+            scratch.of_any(solid, camera)
         })
+    }
+
+    /// As [`Contours::of`], without trees.
+    #[cfg(test)]
+    pub(in crate::render) fn of_any(solid: &Solid, camera: &Camera) -> Contours {
+        Scratch::default().of_any(solid, camera)
+    }
+
+    /// As [`Contours::of`], with trees.
+    #[cfg(test)]
+    pub(in crate::render) fn of_posed(posed: &[Posed<'_>], camera: &Camera) -> Contours {
+        Scratch::default().of_posed(posed, camera)
     }
 
     /// As [`Contours::of`], with the depth image of the same solid and camera already
@@ -95,6 +84,13 @@ impl Contours {
         let room = || Vec::with_capacity(found + found / 8 + 16);
         let (width, height) = (camera.width, camera.height);
         Contours { x: room(), y: room(), tx: room(), ty: room(), length: room(), width, height }
+    }
+
+    /// As many pieces, all of them zero.
+    fn with_length(camera: &Camera, count: usize) -> Contours {
+        let list = || vec![0.0; count];
+        let (width, height) = (camera.width, camera.height);
+        Contours { x: list(), y: list(), tx: list(), ty: list(), length: list(), width, height }
     }
 
     /// Adds a visible piece.
@@ -140,6 +136,73 @@ impl Scratch {
             );
         }
         range
+    }
+
+    /// The contours of any solid.
+    fn of_any(&mut self, solid: &Solid, camera: &Camera) -> Contours {
+        let range = self.trace(solid, camera);
+        let Scratch { projected, looked, pieces, hidden, found, .. } = self;
+        hidden.clear();
+        hidden.resize(pieces.len(), true);
+        // Most pieces pass their first test: only the others need the second one.
+        for side in 0..2 {
+            let pixels = || {
+                hidden
+                    .iter()
+                    .zip(&*pieces)
+                    .filter(|(hidden, _)| **hidden)
+                    .filter_map(|(_, p)| p.pixel(side))
+            };
+            if pixels().next().is_none() {
+                break;
+            }
+            looked.clear(camera);
+            pixels().for_each(|pixel| looked.mark(pixel));
+            let depth = looked.draw(solid, camera, projected);
+            let Some(depths) = Depths::new(depth, camera.width, camera.height, range.extent())
+            else {
+                break;
+            };
+            for (hidden, piece) in hidden.iter_mut().zip(&*pieces) {
+                *hidden = *hidden && !depths.visible_by(piece, side);
+            }
+        }
+        seen(
+            pieces.iter().zip(hidden).filter(|(_, hidden)| !**hidden).map(|(piece, _)| piece),
+            camera,
+            found,
+        )
+    }
+
+    /// The contours of meshes that keep their shape.
+    fn of_posed(&mut self, posed: &[Posed<'_>], camera: &Camera) -> Contours {
+        work::count(|work| work.whole += 1);
+        let Scratch { room, found_faces, hiding, pieces, hidden, found, .. } = self;
+        pieces.clear();
+        let mut range = DepthRange::EMPTY;
+        for posed in posed {
+            range = range.and(&posed.range());
+            if posed.outside {
+                work::count(|work| work.outside += 1);
+                continue;
+            }
+            work::drawn(posed.mesh);
+            let tools = (&mut *found_faces, &mut room.crossed);
+            extract_posed(posed, camera, tools, |piece, _| pieces.push(piece));
+        }
+        hidden.clear();
+        hidden.resize(pieces.len(), true);
+        for side in 0..2 {
+            hiding.test(posed, camera, range.extent(), (side, pieces, hidden));
+        }
+        *found = hidden.iter().filter(|hidden| !**hidden).count();
+        let mut out = Contours::with_length(camera, *found);
+        let lists = out.x.iter_mut().zip(&mut out.y).zip(&mut out.tx).zip(&mut out.ty);
+        let visible = pieces.iter().zip(&*hidden).filter(|(_, hidden)| !**hidden);
+        for (((((x, y), tx), ty), length), (piece, _)) in lists.zip(&mut out.length).zip(visible) {
+            (*x, *y, *tx, *ty, *length) = (piece.x, piece.y, piece.tx, piece.ty, piece.length);
+        }
+        out
     }
 }
 

@@ -8,10 +8,39 @@
 use crate::geom::{Edge, Mesh};
 use crate::render::Camera;
 use crate::render::lines::silhouette::{self, Crossed};
-use crate::render::lines::visibility::{Image, Piece, TestSides};
+use crate::render::lines::visibility::{Image, LONGEST, Piece, TestSides};
 use crate::render::pixels::place::Point;
 use crate::render::pixels::project::{Fronts, Lens, Placement, Vertices, beyond_near};
 use crate::render::simd::vectorised;
+
+/// The vertices of a mesh in the image, all of them or each when it is asked for.
+pub(in crate::render) trait Points {
+    /// A vertex, as [`Vertices::point`].
+    fn point(&self, v: u32) -> Point;
+
+    /// Whether all vertices are usable and beyond the near plane.
+    fn whole(&self) -> bool;
+
+    /// Whether a whole line of edges is too small to be seen, as its width plus height is
+    /// less than [`SPECK`].
+    fn is_speck(&self, line: &[Edge]) -> bool;
+}
+
+impl Points for Vertices<'_> {
+    #[inline(always)]
+    fn point(&self, v: u32) -> Point {
+        Vertices::point(self, v)
+    }
+
+    #[inline(always)]
+    fn whole(&self) -> bool {
+        self.whole
+    }
+
+    fn is_speck(&self, line: &[Edge]) -> bool {
+        self.whole && self.span(line.iter().flat_map(|e| e.vertices)) < SPECK
+    }
+}
 
 /// Whether a point is usable and beyond the near plane.
 fn usable(p: &Point) -> bool {
@@ -40,7 +69,7 @@ pub(in crate::render) struct Origin {
 #[derive(Default)]
 pub(in crate::render) struct Room {
     fronts: Fronts,
-    crossed: Crossed,
+    pub crossed: Crossed,
 }
 
 /// Calls `out` for every piece of a mesh, in the order of its faces and then its edges.
@@ -53,41 +82,48 @@ pub(in crate::render) fn extract_mesh(
     Room { fronts, crossed }: &mut Room,
     out: impl FnMut(Piece, &Origin),
 ) {
-    let Some(image) = Image::new(camera.width, camera.height) else { return };
-    let size = [f64::from(camera.width), f64::from(camera.height)];
+    let Some(mut tracer) = Extractor::new(mesh, placement, camera, vertices, out) else { return };
     fronts.find(mesh, placement);
     let lens = Lens::new(camera);
-    let mut tracer = Extractor { mesh, placement, vertices, open: true, lens, image, size, out };
-    // Nothing can be seen through holes that are too small to be visible.
-    let hole =
-        |line: &[Edge]| line.first().is_some_and(Edge::is_boundary) && !tracer.is_speck(line);
-    tracer.open = mesh.topology.edges.open() && mesh.topology.edges.lines().any(hole);
     let signs = (&fronts.facing[..], &fronts.front[..]);
     vectorised(
         #[inline(always)]
         || {
-            crossed.each(mesh, placement, &lens, vertices, signs, |batch, count| {
-                tracer.silhouettes(batch, count)
-            })
+            crossed.each(
+                mesh,
+                placement,
+                &lens,
+                vertices,
+                signs,
+                #[inline(always)]
+                |batch, count| tracer.silhouettes(batch, count),
+            )
         },
     );
     tracer.edges();
 }
 
+/// Whether a mesh has boundaries through which something can be seen, unlike holes that
+/// are too small to be visible.
+fn is_open(mesh: &Mesh, vertices: &impl Points) -> bool {
+    let edges = &mesh.topology.edges;
+    let hole =
+        |line: &[Edge]| line.first().is_some_and(Edge::is_boundary) && !vertices.is_speck(line);
+    edges.open() && edges.lines().any(hole)
+}
+
 /// Lines of edges, such as the rims of holes, are left out if their width plus height is
 /// less than this, in pixels.
-const SPECK: f32 = 0.1;
-
-/// Segments of this length or longer, in pixels, are divided.
-pub(in crate::render) const LONGEST: f64 = 1.5;
+pub(in crate::render) const SPECK: f32 = 0.1;
 
 /// A segment's corners and ends, as in [`Origin`].
 type Segment = ([u32; 3], [[f64; 3]; 2]);
 
-struct Extractor<'a, F> {
+/// Makes the pieces of one mesh.
+pub(in crate::render) struct Extractor<'a, V, F> {
     mesh: &'a Mesh,
     placement: &'a Placement,
-    vertices: &'a Vertices<'a>,
+    vertices: &'a V,
     /// Whether the mesh has visible boundaries, so that the insides of faces may be
     /// visible.
     open: bool,
@@ -98,55 +134,62 @@ struct Extractor<'a, F> {
     out: F,
 }
 
-impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
+impl<'a, V: Points, F: FnMut(Piece, &Origin)> Extractor<'a, V, F> {
+    /// Calls `out` for every piece. `None` for an image without pixels.
+    pub fn new(
+        mesh: &'a Mesh,
+        placement: &'a Placement,
+        camera: &Camera,
+        vertices: &'a V,
+        out: F,
+    ) -> Option<Self> {
+        let image = Image::new(camera.width, camera.height)?;
+        let (lens, open) = (Lens::new(camera), is_open(mesh, vertices));
+        Some(Extractor { mesh, placement, vertices, open, lens, image, size: image.size(), out })
+    }
+
     /// Makes the pieces of a batch of silhouettes.
     #[inline(always)]
-    fn silhouettes(&mut self, batch: &silhouette::Batch, count: usize) {
+    pub fn silhouettes(&mut self, batch: &silhouette::Batch, count: usize) {
+        let located = silhouette::Located::new(batch, count, self.image.size(), self.open);
         for i in 0..count.min(silhouette::MOST) {
             if !batch.there[i] {
                 continue;
             }
+            if located.single[i] {
+                // Nearly all segments are a single piece.
+                let [tx, ty] = [batch.tangent[0][i], batch.tangent[1][i]];
+                let shape = [batch.middle[0][i], batch.middle[1][i], tx, ty, batch.length[i]];
+                let depth = (batch.depth[i], batch.slack[i]);
+                let pixels = [located.pixels[0][i], located.pixels[1][i]];
+                let inside = [located.inside[0][i], located.inside[1][i]];
+                let piece = Image::located(shape, depth, pixels, inside, self.open);
+                let (corners, ends) = (batch.corners[i], batch.weights(i));
+                let [a, b] = batch.segment(i);
+                let forward = (b.x - a.x) * tx + (b.y - a.y) * ty > 0.0;
+                (self.out)(piece, &Origin { corners, ends, at: 0.5, share: 1.0, forward });
+                continue;
+            }
             let ([a, b], length) = (batch.segment(i), batch.length[i]);
-            let [tangent, direction, middle] = [&batch.tangent, &batch.outward, &batch.middle]
-                .map(|pair| [pair[0][i], pair[1][i]]);
+            let [tangent, direction] =
+                [&batch.tangent, &batch.outward].map(|pair| [pair[0][i], pair[1][i]]);
             let slack = batch.slack[i];
             let look = match self.open {
                 false => TestSides::Outward { direction, slack },
                 true => TestSides::BothSides { direction, slack: [slack; 2] },
             };
-            if length < LONGEST && self.inside(&a) && self.inside(&b) && batch.depth[i].is_finite()
-            {
-                // Nearly all segments are a single piece.
-                let piece = self.image.piece(middle, batch.depth[i], tangent, length, &look, false);
-                let (corners, ends) = (batch.corners[i], batch.weights(i));
-                let forward = (b.x - a.x) * tangent[0] + (b.y - a.y) * tangent[1] > 0.0;
-                (self.out)(piece, &Origin { corners, ends, at: 0.5, share: 1.0, forward });
-            } else {
-                self.cut(
-                    &a,
-                    &b,
-                    length,
-                    tangent,
-                    &look,
-                    false,
-                    (batch.corners[i], batch.weights(i)),
-                );
-            }
+            let from = (batch.corners[i], batch.weights(i));
+            self.cut(&a, &b, length, tangent, &look, false, from);
         }
     }
 
     /// Makes the pieces of creases and boundaries.
-    fn edges(&mut self) {
+    pub fn edges(&mut self) {
         for line in self.mesh.topology.edges.lines() {
-            if !self.is_speck(line) {
+            if !self.vertices.is_speck(line) {
                 line.iter().for_each(|edge| self.edge(edge.vertices, edge.faces));
             }
         }
-    }
-
-    /// Whether a whole line of edges is too small to be seen.
-    fn is_speck(&self, line: &[Edge]) -> bool {
-        self.vertices.whole && self.vertices.span(line.iter().flat_map(|e| e.vertices)) < SPECK
     }
 
     /// Makes the pieces of a crease or boundary edge.
@@ -155,12 +198,16 @@ impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
         let [Some(from), Some(to)] = vertices.map(|v| mesh.positions.get(v as usize)) else {
             return;
         };
-        let ends = vertices.map(|v| points.point(v));
-        if ends.iter().any(|p| p.nearness.is_nan()) || !ends.iter().any(usable) {
-            return;
+        let mut ends = [placement.point(from.as_dvec3()), placement.point(to.as_dvec3())];
+        if !points.whole() {
+            let points = vertices.map(|v| points.point(v));
+            if points.iter().any(|p| p.nearness.is_nan()) || !points.iter().any(usable) {
+                return;
+            }
+            let Some(beyond) = beyond_near(ends) else { return };
+            ends = beyond;
         }
-        let segment = beyond_near([from, to].map(|p| placement.point(p.as_dvec3())));
-        let Some([a, b]) = segment.map(|ends| ends.map(|p| self.lens.point(p))) else { return };
+        let [a, b] = [self.lens.point(ends[0]), self.lens.point(ends[1])];
         let Some([tx, ty, length]) = tangent(&a, &b) else { return };
         let direction = [ty, -tx];
         let steep = (b.nearness - a.nearness) / length;
@@ -174,7 +221,8 @@ impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
                 .iter()
                 .find(|&&v| mesh.positions.get(v as usize).is_some_and(|p| p != from && p != to));
             let Some(&opposite) = opposite else { continue };
-            let corners = face.map(|v| placement.point(mesh.positions[v as usize].as_dvec3()));
+            let corner = |i: usize| placement.point(mesh.positions[face[i] as usize].as_dvec3());
+            let corners = [corner(0), corner(1), corner(2)];
             let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
             let towards = if self.lens.pinhole { -normal.dot(corners[0]) } else { normal.z };
             let front = (towards > 0.0) != placement.mirrored;
@@ -246,7 +294,8 @@ impl<F: FnMut(Piece, &Origin)> Extractor<'_, F> {
         if !(length > 1e-9 && length.is_finite()) {
             return;
         }
-        let pieces = if length < LONGEST { 1.0 } else { (length + 0.5).floor() };
+        // Truncated: positive.
+        let pieces = if length < LONGEST { 1.0 } else { ((length + 0.5) as u64) as f64 };
         let step = (t1 - t0) / pieces;
         let forward = dx * tangent[0] + dy * tangent[1] > 0.0;
         for i in 0..pieces as usize {

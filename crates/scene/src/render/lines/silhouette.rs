@@ -2,6 +2,7 @@
 //! facing, for many faces at a time.
 
 use crate::geom::{Mesh, Patches, Run, Topology};
+use crate::render::lines::visibility::{BESIDE, LONGEST};
 use crate::render::pixels::place::Point;
 use crate::render::pixels::project::{Lens, Placement, Vertices, beyond_near};
 use glam::DVec3;
@@ -85,6 +86,60 @@ impl Default for Batch {
     }
 }
 
+/// Where the segments of a batch are tested for visibility.
+pub(in crate::render) struct Located {
+    /// Whether a segment is a single piece: short and wholly inside of the image.
+    pub single: [bool; MOST],
+    /// On the outer and the inner side: the pixel nearest to the position tested, and whether
+    /// it contains it. The inner side only if both are tested.
+    pub pixels: [[u32; MOST]; 2],
+    pub inside: [[bool; MOST]; 2],
+}
+
+impl Located {
+    /// For the first `count` segments in an image of some size.
+    #[inline(always)]
+    pub fn new(batch: &Batch, count: usize, [width, height]: [f64; 2], both: bool) -> Located {
+        let mut located =
+            Located { single: [false; MOST], pixels: [[0; MOST]; 2], inside: [[false; MOST]; 2] };
+        let Batch { ends: [from, to], length, middle, outward, depth, .. } = batch;
+        let (last, across) = ([width - 1.0, height - 1.0], width as i32);
+        // NaN becomes 0.
+        let index = |v: f64, last: f64| {
+            let v = if v > 0.0 { v } else { 0.0 };
+            (if v < last { v } else { last }) as i32
+        };
+        for start in (0..count.min(MOST)).step_by(FEW) {
+            for i in start..start + FEW {
+                let within = |end: &[Row; 3]| {
+                    (end[0][i] >= 0.0)
+                        & (end[1][i] >= 0.0)
+                        & (end[0][i] <= width)
+                        & (end[1][i] <= height)
+                };
+                located.single[i] = (length[i] < LONGEST)
+                    & within(from)
+                    & within(to)
+                    & (depth[i].abs() < f64::INFINITY);
+            }
+            for (side, sign) in [(0, BESIDE), (1, -BESIDE)] {
+                if side == 1 && !both {
+                    continue;
+                }
+                for i in start..start + FEW {
+                    let x = middle[0][i] + sign * outward[0][i];
+                    let y = middle[1][i] + sign * outward[1][i];
+                    located.inside[side][i] = (x >= 0.0) & (y >= 0.0) & (x < width) & (y < height);
+                    located.pixels[side][i] =
+                        index(y, last[1]).wrapping_mul(across).wrapping_add(index(x, last[0]))
+                            as u32;
+                }
+            }
+        }
+        located
+    }
+}
+
 impl Crossed {
     /// Calls `out` with the segments in all faces of a mesh, batch by batch in the order
     /// of the faces, and the number of faces in each batch. By vertex, `facing` is given,
@@ -114,6 +169,33 @@ impl Crossed {
                 _ => batch.work::<MOST>(placement, lens, count, whole),
             }
             out(batch, faces.len());
+        }
+    }
+
+    /// As [`Crossed::each`] for a mesh that is beyond the near plane, with the faces already
+    /// found: the corners of each, the one whose sign differs first.
+    #[inline(always)]
+    pub fn each_of(
+        &mut self,
+        found: &[[u32; 3]],
+        mesh: &Mesh,
+        placement: &Placement,
+        lens: &Lens,
+        mut out: impl FnMut(&Batch, usize),
+    ) {
+        let batch = &mut self.batch;
+        for found in found.chunks(MOST) {
+            for (i, corners) in found.iter().enumerate() {
+                batch.place(i, *corners, mesh);
+            }
+            let count = found.len();
+            match count.div_ceil(FEW) {
+                1 => batch.project_and_work::<FEW>(placement, lens, count),
+                2 => batch.project_and_work::<{ 2 * FEW }>(placement, lens, count),
+                3 => batch.project_and_work::<{ 3 * FEW }>(placement, lens, count),
+                _ => batch.project_and_work::<MOST>(placement, lens, count),
+            }
+            out(batch, count);
         }
     }
 
@@ -194,17 +276,59 @@ impl Batch {
         vertices: &Vertices<'_>,
         facing: &[f64],
     ) {
-        self.corners[i] = corners;
+        self.place(i, corners, mesh);
         for (k, v) in corners.into_iter().enumerate() {
             let (at, point) = (v as usize, vertices.point(v));
-            let [p, n] = [&mesh.positions, &mesh.normals]
-                .map(|list| list.get(at).copied().unwrap_or_default().as_dvec3());
-            for axis in 0..3 {
-                (self.positions[k][axis][i], self.normals[k][axis][i]) = (p[axis], n[axis]);
-            }
             [self.image[k][0][i], self.image[k][1][i], self.image[k][2][i]] =
                 [point.x, point.y, point.nearness];
             self.facing[k][i] = facing.get(at).copied().unwrap_or_default();
+        }
+    }
+
+    /// Sets the corners of a face, in the mesh's coordinates alone.
+    #[inline(always)]
+    fn place(&mut self, i: usize, corners: [u32; 3], mesh: &Mesh) {
+        self.corners[i] = corners;
+        for (k, v) in corners.into_iter().enumerate() {
+            let [p, n] = [&mesh.positions, &mesh.normals]
+                .map(|list| list.get(v as usize).copied().unwrap_or_default().as_dvec3());
+            for axis in 0..3 {
+                (self.positions[k][axis][i], self.normals[k][axis][i]) = (p[axis], n[axis]);
+            }
+        }
+    }
+
+    /// Projects the corners of the first `N` faces, then as [`Batch::work`].
+    #[inline(always)]
+    fn project_and_work<const N: usize>(
+        &mut self,
+        placement: &Placement,
+        lens: &Lens,
+        count: usize,
+    ) {
+        match lens.pinhole {
+            true => self.project::<N, true>(placement, lens),
+            false => self.project::<N, false>(placement, lens),
+        }
+        self.work::<N>(placement, lens, count, true);
+    }
+
+    /// Computes the facing and the image of the corners, as for whole meshes.
+    #[inline(always)]
+    fn project<const N: usize, const PINHOLE: bool>(&mut self, placement: &Placement, lens: &Lens) {
+        let lens = Lens { pinhole: PINHOLE, ..*lens };
+        let (rows, (view, bend)) = (placement.rows(), placement.sight());
+        let Batch { positions, normals, facing, image, .. } = self;
+        for (((p, n), facing), image) in positions.iter().zip(normals).zip(facing).zip(image) {
+            for i in 0..N {
+                let [px, py, pz] = [p[0][i], p[1][i], p[2][i]];
+                facing[i] = n[0][i] * (view.x - px * bend)
+                    + n[1][i] * (view.y - py * bend)
+                    + n[2][i] * (view.z - pz * bend);
+                let [x, y, z] = rows.map(|[a, b, c, t]| px * a + py * b + pz * c + t);
+                let point = lens.point(DVec3::new(x, y, z)).single();
+                (image[0][i], image[1][i], image[2][i]) = (point.x, point.y, point.nearness);
+            }
         }
     }
 

@@ -12,6 +12,9 @@ use crate::render::pixels::project::DepthRange;
 /// Distance from a piece to the positions tested, in pixels.
 pub(in crate::render) const BESIDE: f64 = 1.2;
 
+/// Segments of this length or longer, in pixels, are divided.
+pub(in crate::render) const LONGEST: f64 = 1.5;
+
 /// Depth tolerance as a fraction of the object's depth range.
 pub(in crate::render) const TOLERANCE: f64 = 0.006;
 
@@ -124,12 +127,39 @@ impl Image {
     #[inline(always)]
     fn side(&self, x: f64, y: f64, slack: f64) -> Side {
         let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
-        let index = |v: f64, side: usize| v.max(0.0).min((side - 1) as f64) as i32 as usize;
+        // One comparison each, unlike `max` and `min`; NaN becomes 0.
+        let index = |v: f64, side: usize| {
+            let (v, last) = (if v > 0.0 { v } else { 0.0 }, (side - 1) as f64);
+            (if v < last { v } else { last }) as i32 as usize
+        };
         Side {
             pixel: (index(y, self.height) * self.width + index(x, self.width)) as u32,
             inside,
             slack,
         }
+    }
+
+    /// Size in pixels.
+    #[inline(always)]
+    pub fn size(&self) -> [f64; 2] {
+        [self.width as f64, self.height as f64]
+    }
+
+    /// As [`Image::piece`] for a smooth silhouette, with the pixels tested and whether they
+    /// contain the position; the second only if both sides are tested.
+    #[inline(always)]
+    pub fn located(
+        [x, y, tx, ty, length]: [f64; 5],
+        (depth, slack): (f64, f64),
+        pixels: [u32; 2],
+        inside: [bool; 2],
+        both: bool,
+    ) -> Piece {
+        let [x, y, tx, ty, length] = [x, y, tx, ty, length].map(|v| v as f32);
+        let side = |i: usize| Side { pixel: pixels[i], inside: inside[i], slack };
+        let none = Side { pixel: NOWHERE, inside: true, slack: 0.0 };
+        let sides = [side(0), if both { side(1) } else { none }];
+        Piece { x, y, tx, ty, length, edge: false, depth, sides }
     }
 
     /// A piece with its middle at a position and depth, of an edge or of a smooth
@@ -190,10 +220,12 @@ impl<'a> Depths<'a> {
     /// The least depth at which a test passes.
     #[inline]
     fn threshold(&self, [depth, slack, most]: [f64; 3], inside: bool) -> f64 {
-        let slack = slack.min(most);
+        // One comparison each, unlike `max` and `min`.
+        let slack = if slack < most { slack } else { most };
         // Outside of the image only the object itself can be tested: be lenient, as its
         // side may bend towards the camera.
-        let slack = if inside { slack } else { slack.max(10.0 * self.tolerance) };
+        let lenient = 10.0 * self.tolerance;
+        let slack = if inside || slack > lenient { slack } else { lenient };
         depth - slack - self.tolerance - 1e-6 * depth
     }
 
@@ -230,6 +262,15 @@ impl<'a> Depths<'a> {
     #[inline]
     pub fn visible(&self, piece: &Piece) -> bool {
         self.visible_by(piece, 0) || self.visible_by(piece, 1)
+    }
+
+    /// The pixel of a piece's test on the first or the second side, and the least depth there
+    /// at which it passes.
+    #[inline]
+    pub fn least_by(&self, piece: &Piece, side: usize) -> Option<(u32, f64)> {
+        let own = piece.sides.get(side).filter(|side| side.pixel != NOWHERE)?;
+        let most = self.most[usize::from(piece.edge)];
+        Some((own.pixel, self.threshold([piece.depth, own.slack, most], own.inside)))
     }
 
     /// Whether a piece passes its test on the first or the second side.

@@ -30,6 +30,7 @@ fn centre(pixel: usize) -> i32 {
 }
 
 /// A corner in units, even if its rounded position was clamped.
+#[inline(always)]
 fn units(place: Place, point: &Point) -> [i64; 2] {
     let [x, y, ..] = place.to_array();
     if is_near(place) {
@@ -40,6 +41,12 @@ fn units(place: Place, point: &Point) -> [i64; 2] {
         let v = (f64::from(v as f32) - 0.5) * f64::from(UNIT);
         ((v + if v < 0.0 { -0.5 } else { 0.5 }) as i64).clamp(-FARTHEST, FARTHEST)
     })
+}
+
+/// Whether products of two differences of coordinates fit into 64 bits.
+#[inline(always)]
+fn is_small(corners: &[[i64; 2]; 3]) -> bool {
+    corners.as_flattened().iter().all(|v| v.abs() < 1 << 29)
 }
 
 /// Orientation of near positions in the image: positive for clockwise, negative for
@@ -95,23 +102,49 @@ impl Coverage {
         // A counter-clockwise triangle's edges run the other way. Branch-free, since a
         // branch would be unpredictable.
         let way = N::from(2 * i32::from(self.clockwise) - 1);
-        std::array::from_fn(|i| {
-            let (p, q) = (corners[i], corners[(i + 1) % 3]);
+        let edge = |p: [N; 2], q: [N; 2]| {
             let (dx, dy) = ((q[0] - p[0]) * way, (q[1] - p[1]) * way);
             // Centres on left and top edges count as inside.
             let has = (dy < zero) | ((dy == zero) & (dx > zero));
             let at = dx * (y - p[1]) - dy * (x - p[0]) + N::from(i32::from(has)) - one;
             [at, (zero - dy) * unit, dx * unit]
-        })
+        };
+        let [a, b, c] = corners;
+        [edge(a, b), edge(b, c), edge(c, a)]
+    }
+
+    /// Whether it covers a pixel.
+    #[inline(always)]
+    pub fn covers(&self, points: &[Point; 3], column: usize, row: usize) -> bool {
+        let Coverage { columns, rows, .. } = *self;
+        if !(columns[0]..columns[1]).contains(&column) || !(rows[0]..rows[1]).contains(&row) {
+            return false;
+        }
+        let (corners, at) = (self.corners(points), [centre(column), centre(row)]);
+        match is_small(&corners) {
+            true => {
+                let [a, b, c] = self.edges(corners, [i64::from(at[0]), i64::from(at[1])]);
+                (a[0] | b[0] | c[0]) >= 0
+            }
+            false => {
+                let corners = corners.map(|p| p.map(i128::from));
+                self.edges(corners, at.map(i128::from)).iter().all(|edge| edge[0] >= 0)
+            }
+        }
+    }
+
+    /// The corners in units.
+    #[inline(always)]
+    fn corners(&self, points: &[Point; 3]) -> [[i64; 2]; 3] {
+        let ([p, q, r], [a, b, c]) = (points, self.places);
+        [units(a, p), units(b, q), units(c, r)]
     }
 
     /// Calls `draw` for every row's run of pixels: row, first column, one past the last
     /// column.
     pub fn runs(&self, points: &[Point; 3], draw: impl FnMut(usize, usize, usize)) {
-        // Products of two differences must fit into the integer type.
-        let corners: [[i64; 2]; 3] = std::array::from_fn(|i| units(self.places[i], &points[i]));
-        let near = corners.as_flattened().iter().all(|v| v.abs() < 1 << 29);
-        if near {
+        let corners = self.corners(points);
+        if is_small(&corners) {
             self.runs_in(corners, draw)
         } else {
             self.runs_in(corners.map(|p| p.map(i128::from)), draw)

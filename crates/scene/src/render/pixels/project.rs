@@ -18,7 +18,7 @@ use glam::{DMat3, DVec3, Vec3};
 const LANES: usize = 64;
 
 /// Vertices with a coordinate beyond this (scene units) are unusable.
-const HUGE: f64 = 1e9;
+pub(in crate::render) const HUGE: f64 = 1e9;
 
 /// A camera's projection from camera coordinates to the image.
 #[derive(Clone, Copy, Debug)]
@@ -120,6 +120,30 @@ impl Placement {
     #[inline(always)]
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.m * p + self.t
+    }
+
+    /// The linear part and the shift by axis of the camera.
+    #[inline(always)]
+    pub fn rows(&self) -> [[f64; 4]; 3] {
+        let Placement { m, t, .. } = self;
+        [0, 1, 2].map(|r| [m.x_axis[r], m.y_axis[r], m.z_axis[r], t[r]])
+    }
+
+    /// The linear part.
+    pub fn matrix(&self) -> DMat3 {
+        self.m
+    }
+
+    /// Where the mesh's origin is.
+    pub fn shift(&self) -> DVec3 {
+        self.t
+    }
+
+    /// `view` and `bend` in `facing = n . (view - bend * p)`, for a vertex p of the mesh with
+    /// normal n: positive where it faces the camera.
+    #[inline(always)]
+    pub fn sight(&self) -> (DVec3, f64) {
+        (self.view, self.bend)
     }
 
     /// Transforms a normal of the mesh to camera coordinates: outward, not of unit
@@ -234,8 +258,7 @@ impl Projected {
     ) -> Extents {
         let mut extents = Extents { near: f64::INFINITY, far: f64::NEG_INFINITY, whole: true };
         // Copies, so that the compiler knows that no write changes them.
-        let (Placement { m, t, .. }, lens) = (*placement, Lens { pinhole: PINHOLE, ..*lens });
-        let rows = [0, 1, 2].map(|r| [m.x_axis[r], m.y_axis[r], m.z_axis[r], t[r]]);
+        let (rows, lens) = (placement.rows(), Lens { pinhole: PINHOLE, ..*lens });
         let lists = groups(&mut self.x[first..])
             .zip(groups(&mut self.y[first..]))
             .zip(groups(&mut self.nearness[first..]))
@@ -333,8 +356,7 @@ impl Vertices<'_> {
     /// Width plus height of the bounding box of some vertices, in pixels.
     pub fn span(&self, of: impl Iterator<Item = u32>) -> f32 {
         let places = of.filter_map(|v| self.places.get(v as usize));
-        let least = places.fold(Place::INFINITY, |a, b| a.min(*b));
-        -(least.x + least.y + least.z + least.w)
+        span_of(places.fold(Place::INFINITY, |a, b| a.min(*b)))
     }
 
     /// The least coordinates of the rounded positions in some runs.
@@ -402,6 +424,11 @@ impl Vertices<'_> {
         let at = |list: &[f32]| list.get(v as usize).map_or(f64::NAN, |x| f64::from(*x));
         Point { x: at(self.x), y: at(self.y), nearness: at(self.nearness) }
     }
+}
+
+/// Width plus height of the bounding box of rounded positions with these least coordinates.
+pub(in crate::render) fn span_of(least: Place) -> f32 {
+    -(least.x + least.y + least.z + least.w)
 }
 
 /// Projects every vertex of a solid, instance by instance.

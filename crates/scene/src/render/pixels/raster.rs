@@ -78,7 +78,12 @@ fn mesh_triangles(
 /// from outside, the back faces of a closed body are hidden by its other faces.
 /// Counter-clockwise in the scene is counter-clockwise in the image, unless mirrored.
 fn back(mesh: &Mesh, placement: &Placement, vertices: &Vertices<'_>) -> f64 {
-    match mesh.topology.encloses && vertices.whole {
+    back_of(mesh, placement, vertices.whole)
+}
+
+/// The same for a mesh of which all vertices are usable and beyond the near plane, or not.
+pub(in crate::render) fn back_of(mesh: &Mesh, placement: &Placement, whole: bool) -> f64 {
+    match mesh.topology.encloses && whole {
         false => 0.0,
         true if placement.mirrored => -1.0,
         true => 1.0,
