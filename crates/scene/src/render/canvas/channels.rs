@@ -5,48 +5,12 @@
 //! depth: different numbers of the first may be rounded to the same of the second.
 
 use super::dynamic_mesh::DynamicMesh;
-use super::layer::Layer;
-use super::meshes::Member;
+use super::static_channels::{NOBODY, StaticChannels};
 use crate::render::Camera;
 use crate::render::pixels::area::Area;
-use crate::render::pixels::frame::{ChannelPixels, part_number};
+use crate::render::pixels::frame::part_number;
 use crate::render::pixels::raster::empty;
 use crate::render::simd::vectorised;
-
-/// No mesh, and no moving mesh.
-const NOBODY: u32 = u32::MAX;
-
-/// What the stationary meshes show at each pixel.
-#[derive(Default)]
-pub struct StaticChannels {
-    pixels: ChannelPixels,
-    /// The index of the mesh shown.
-    mesh: Vec<u32>,
-}
-
-impl StaticChannels {
-    /// Nothing is shown.
-    pub fn clear(&mut self, camera: &Camera) {
-        self.pixels.clear(camera, &Area::whole(camera));
-        self.mesh.clear();
-        self.mesh.resize(camera.pixels(), NOBODY);
-    }
-
-    /// Adds a mesh after all those before it in the solid.
-    pub fn put(&mut self, member: &Member<'_>, layer: &Layer, width: usize) {
-        let StaticChannels { pixels: ChannelPixels { nearness, part, normal }, mesh } = self;
-        let (area, own) = (&layer.area, &layer.channels);
-        let positions = (area.top..area.bottom)
-            .flat_map(|row| row * width + area.left..row * width + area.right);
-        for (at, i) in positions.zip(0..own.nearness.len()) {
-            if own.nearness[i] > nearness[at] {
-                (nearness[at], mesh[at]) = (own.nearness[i], member.index as u32);
-                (part[at], normal[at]) =
-                    (part_number(own.part[i], member.first_part), own.normal[i]);
-            }
-        }
-    }
-}
 
 /// What a picture shows at each pixel.
 #[derive(Default)]

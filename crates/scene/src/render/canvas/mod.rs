@@ -15,6 +15,7 @@ mod dynamic_mesh;
 mod layer;
 mod meshes;
 mod picture;
+mod static_channels;
 mod static_layer;
 
 use self::layer::{Shows, Tools, camera_bits};

@@ -1,7 +1,7 @@
 //! The stationary meshes of a scene: their depth, parts and normals, and their pieces of
 //! contour by the pixels at which they are tested.
 
-use super::channels::StaticChannels;
+use super::static_channels::StaticChannels;
 use crate::render::Camera;
 use crate::render::lines::visibility::{DepthTest, Depths, Piece};
 use crate::render::pixels::area::Area;
