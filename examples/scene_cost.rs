@@ -1,8 +1,11 @@
 //! Measures one transition as a scene grows in which only one object is uncertain: the
 //! pose of a vase drifts among fixed boxes, spheres and lathes.
 //!
-//!     cargo run --release --example scene_cost -- [N…] [nested|flat] [front|hidden] [contour|chamfer|both] [count=TRANSITIONS] [scale=S]
+//!     cargo run --release --example scene_cost -- [N…] [nested|flat] [front|hidden] [COMPARATOR…] [count=TRANSITIONS] [warm=TRANSITIONS] [scale=S]
 //!
+//! COMPARATOR is `contour` (the default), `chamfer`, `symmetric` (chamfer distance), `mask`,
+//! `depth`, `region`, `parts` (`scene.region` by parts) or `shading` (`scene.region` with
+//! shading); with several, all are observed.
 //! The observed picture is rendered from the program at the truth; N includes the vase.
 //! `nested`: the fixed objects form a separate group; `flat`: all objects are members of
 //! one group. `front`: the vase is in front of the others; `hidden`: it is among them, so
@@ -16,10 +19,11 @@ use clock::processor_seconds;
 use pcadlang::infer::{Drift, Kernel, Pick, SiteSelection, StepContext};
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
+use pcadlang::report::pictures::shaded;
 use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::scene::{ImageValue, ViewValue};
+use pcadlang::scene::{DepthValue, ImageValue, MaskValue, ViewValue};
 use pcadlang::trace::{Draws, Selector, Trace};
-use pcadlang::vision::ContourMap;
+use pcadlang::vision::{ContourMap, DepthMap, Mask, Photo};
 use pcadlang::{Model, Program};
 use std::error::Error;
 use std::fmt::Write;
@@ -27,33 +31,57 @@ use std::fmt::Write;
 /// The longer side of the picture, in pixels.
 const SIZE: u32 = 128;
 
-/// The number of transitions of the warm-up, in which the kernel learns its scale.
+/// The number of transitions of the warm-up, in which the kernel learns its scale, if none is given.
 const WARM: u64 = 3000;
+
+/// The comparators by name: the call, and the observed picture.
+const COMPARATORS: [(&str, &str, &str); 8] = [
+    ("contour", "scene.contour(view", "photo"),
+    ("chamfer", "scene.chamfer(view", "photo"),
+    ("symmetric", "scene.chamfer(view, symmetric = true", "photo"),
+    ("mask", "scene.mask(view", "covered"),
+    ("depth", "scene.depth(view", "range"),
+    ("region", "scene.region(view", "photo"),
+    ("parts", "scene.region(view, groups = \"parts\"", "photo"),
+    ("shading", "scene.region(view, shading = 0.05", "photo"),
+];
 
 /// The options.
 struct Wanted {
     flat: bool,
     front: bool,
-    observe: String,
+    /// Which of [`COMPARATORS`] are observed.
+    observe: Vec<usize>,
     count: u64,
+    warm: u64,
     scale: Option<f64>,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut sizes: Vec<usize> = Vec::new();
-    let mut wanted =
-        Wanted { flat: false, front: true, observe: "contour".into(), count: 3000, scale: None };
+    let mut wanted = Wanted {
+        flat: false,
+        front: true,
+        observe: Vec::new(),
+        count: 3000,
+        warm: WARM,
+        scale: None,
+    };
     for a in std::env::args().skip(1) {
         match a.as_str() {
             "nested" | "flat" => wanted.flat = a == "flat",
             "front" | "hidden" => wanted.front = a == "front",
-            "contour" | "chamfer" | "both" => wanted.observe = a,
-            _ => match a.split_once('=') {
-                Some(("count", count)) => wanted.count = count.parse()?,
-                Some(("scale", scale)) => wanted.scale = Some(scale.parse()?),
+            _ => match (a.split_once('='), COMPARATORS.iter().position(|c| c.0 == a)) {
+                (_, Some(comparator)) => wanted.observe.push(comparator),
+                (Some(("count", count)), _) => wanted.count = count.parse()?,
+                (Some(("warm", warm)), _) => wanted.warm = warm.parse()?,
+                (Some(("scale", scale)), _) => wanted.scale = Some(scale.parse()?),
                 _ => sizes.push(a.parse()?),
             },
         }
+    }
+    if wanted.observe.is_empty() {
+        wanted.observe.push(0);
     }
     if sizes.is_empty() {
         sizes = vec![1, 10, 100, 1000];
@@ -67,9 +95,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             pick: Pick::All,
         };
         let mut kernel = Drift::new(scope, wanted.scale);
-        run(&mut kernel, &mut trace, 0..WARM, true)?;
+        let warm = wanted.warm;
+        run(&mut kernel, &mut trace, 0..warm, true)?;
         let begun = processor_seconds();
-        let moved = run(&mut kernel, &mut trace, WARM..WARM + wanted.count, false)?;
+        let moved = run(&mut kernel, &mut trace, warm..warm + wanted.count, false)?;
         let each = (processor_seconds() - begun) / wanted.count as f64 * 1e6;
         let times = each / *alone.get_or_insert(each);
         println!(
@@ -101,25 +130,28 @@ fn run(
 /// at the truth.
 fn scene(n: usize, wanted: &Wanted) -> Result<(Model, Trace), Box<dyn Error>> {
     let text = program(n, wanted);
-    let over = |map: ContourMap| {
-        let image = Value::object(ImageValue::contours(map, None));
-        Program::parse(&text)?
-            .observe("photo", image)
-            .camera(Camera::default_for(SIZE, SIZE))
-            .compile()
+    let over = |image: ImageValue, depth: Vec<f32>| {
+        let mask = Mask::new(SIZE, SIZE, depth.iter().map(|d| d.is_finite()).collect())?;
+        Ok::<_, Box<dyn Error>>(
+            Program::parse(&text)?
+                .observe("photo", Value::object(image))
+                .observe("covered", Value::object(MaskValue::new(mask)))
+                .observe("range", Value::object(DepthValue::new(DepthMap::new(SIZE, SIZE, depth)?)))
+                .camera(Camera::default_for(SIZE, SIZE))
+                .compile()?,
+        )
     };
-    let mut trace = over(ContourMap::new(SIZE, SIZE))?.simulate(1, 0)?;
+    let grey = Photo::from_rgb(image::RgbImage::new(SIZE, SIZE))?;
+    let nothing = ImageValue::contours(ContourMap::new(SIZE, SIZE), Some(grey));
+    let mut trace = over(nothing, vec![f32::INFINITY; (SIZE * SIZE) as usize])?.simulate(1, 0)?;
     let truth = trace.constraints();
-    let c = view(&mut trace)?.0.contours(SIZE);
+    let seen = view(&mut trace)?.0;
+    let (c, frame) = (seen.contours(SIZE), seen.frame(SIZE));
     let [x, y, tx, ty] = [&c.x, &c.y, &c.tx, &c.ty].map(Clone::clone);
-    let model = over(ContourMap {
-        x,
-        y,
-        tx,
-        ty,
-        strength: vec![1.0; c.len()],
-        ..ContourMap::new(SIZE, SIZE)
-    })?;
+    let strength = vec![1.0; c.len()];
+    let map = ContourMap { x, y, tx, ty, strength, ..ContourMap::new(SIZE, SIZE) };
+    let photo = Photo::from_rgb(shaded(&frame))?;
+    let model = over(ImageValue::contours(map, Some(photo)), frame.depth.clone())?;
     let (trace, _) = Trace::generate(model.code().clone(), truth, draws(), Default::default())?;
     Ok((model, trace))
 }
@@ -136,8 +168,9 @@ fn view(trace: &mut Trace) -> Result<ViewValue, Box<dyn Error>> {
 /// Returns the program's text. The fixed objects are at random positions in view, and
 /// smaller if there are more of them.
 fn program(n: usize, wanted: &Wanted) -> String {
-    let mut text =
-        String::from("include \"std/scene.pcad\" as scene;\ndata photo: image \"the picture\";\n");
+    let mut text = String::from(
+        "include \"std/scene.pcad\" as scene;\ndata photo: image \"the picture\";\ndata covered = mask();\ndata range = depth();\n",
+    );
     let mut random = StreamKey::new(7, 0, Purpose::PREDICT).stream(0, 0, 0);
     let mut things = String::new();
     for i in 1..n {
@@ -178,11 +211,8 @@ let body = scene.lathe([{{ y: ys, r: 0.3 + 0.1 * sin(5 * ys) }}], sides = 48);
 let vase = scene.affine(translate = [t.x, t.y - 0.6, t.z], rotate = [r.x, r.y, r.z]) * body;
 let view = scene.render(scene.group({group}));"
     );
-    if wanted.observe != "chamfer" {
-        let _ = writeln!(text, "observe scene.contour(view, size = {SIZE}) = photo as ratio;");
-    }
-    if wanted.observe != "contour" {
-        let _ = writeln!(text, "observe scene.chamfer(view, size = {SIZE}) = photo as distance;");
+    for (name, call, seen) in wanted.observe.iter().filter_map(|i| COMPARATORS.get(*i)) {
+        let _ = writeln!(text, "observe {call}, size = {SIZE}) = {seen} as {name};");
     }
     text
 }

@@ -16,7 +16,7 @@ use crate::vision::chamfer::{self, Mode};
 use crate::vision::contour_ratio;
 use crate::vision::{
     Chamfer, ChamferOptions, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
-    MaskLikelihood, VisionError,
+    DepthTally, MaskLikelihood, VisionError,
 };
 use std::cell::{OnceCell, RefCell};
 use std::sync::Arc;
@@ -97,7 +97,7 @@ pub(super) const TABLE: &[Row] = &[
         },
     )
     .vjp(|_, _, by| Some(by_view(by.clone(), 3))),
-    native(
+    incremental(
         "depth",
         SECTION,
         &[
@@ -111,9 +111,11 @@ pub(super) const TABLE: &[Row] = &[
         Type::Likelihood,
         "The density of an observed depth map: normal about the rendered depth, with outliers; \
          missing pixels are ignored.",
-        |a| {
+        |a, previous| {
             let options = [a.positive_or(1, 0.05)?, a.num_or(2, 0.05)?, a.num_or(3, 0.0)?, a.num_or(4, 100.0)?];
-            likelihood(DepthOf { view: view(a)?, size: size(a, 5)?, options })
+            let tally = SharedTally::after(previous);
+            let value = likelihood(DepthOf { view: view(a)?, size: size(a, 5)?, options, tally: Arc::clone(&tally) })?;
+            Ok((value, tally))
         },
     )
     .vjp(|_, _, by| Some(by_view(by.clone(), 5))),
@@ -426,6 +428,7 @@ struct DepthOf {
     view: Arc<View>,
     size: u32,
     options: [f64; 4],
+    tally: Arc<SharedTally<DepthLikelihood, DepthTally>>,
 }
 
 impl DepthOf {
@@ -466,8 +469,9 @@ impl Likelihood for DepthOf {
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
         let (prepared, frame) = self.prepared(observed)?;
-        prepared
-            .log_likelihood(&frame.depth, frame.width, frame.height)
+        let Frame { depth, width, height, .. } = &*frame;
+        self.tally
+            .with(&prepared, |tally| prepared.log_likelihood_after(depth, *width, *height, tally))
             .map_err(|e| format!("scene.depth: {e}"))
     }
 

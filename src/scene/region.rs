@@ -12,9 +12,9 @@ use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Args, PreviousEvaluation, Row, State, Type, opt};
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
-use crate::render::{Frame, View};
+use crate::render::{Frame, FrameChange, View};
 use crate::rng::Stream;
-use crate::vision::region::{Quantised, Tally};
+use crate::vision::region::{GroupChange, Quantised, Tally};
 use crate::vision::{Region, RegionOptions};
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -113,9 +113,8 @@ impl RegionOf {
         self.groups == Groups::Silhouette && self.options.shading == 0.0
     }
 
-    /// Returns the observed colours, prepared at the rendered size, and the rendered
-    /// frame.
-    fn prepared(&self, observed: &Value) -> Result<(Arc<Region>, Arc<Frame>), String> {
+    /// Returns the observed colours, prepared at the rendered size.
+    fn region(&self, observed: &Value) -> Result<Arc<Region>, String> {
         let image = image(observed, &self.view, self.name())?;
         let Some(photo) = image.as_photo() else {
             return Err(
@@ -123,13 +122,16 @@ impl RegionOf {
                     .into(),
             );
         };
-        let frame =
-            if self.outline() { self.view.depth(self.size) } else { self.view.frame(self.size) };
-        let key = (self.options.clone(), frame.width, frame.height);
-        let region = image.regions.get(key, |(options, w, h)| {
+        let camera = self.view.camera().scaled_to(self.size);
+        let key = (self.options.clone(), camera.width, camera.height);
+        image.regions.get(key, |(options, w, h)| {
             Region::prepare(photo, *w, *h, options).map_err(|e| format!("scene.region: {e}"))
-        })?;
-        Ok((region, frame))
+        })
+    }
+
+    /// Returns the rendered frame.
+    fn frame(&self) -> Arc<Frame> {
+        if self.outline() { self.view.depth(self.size) } else { self.view.frame(self.size) }
     }
 
     /// Computes the group of each pixel.
@@ -137,7 +139,16 @@ impl RegionOf {
         groups.clear();
         match self.groups {
             Groups::Silhouette => groups.extend(frame.mask().map(u8::from)),
-            Groups::Parts => groups.extend(frame.part.iter().map(|p| group(*p))),
+            Groups::Parts => self.fill_parts(&frame.part, groups),
+        }
+    }
+
+    /// Computes the group of some pixels, given their parts.
+    fn fill_parts(&self, parts: &[u16], groups: &mut Vec<u8>) {
+        groups.clear();
+        match self.groups {
+            Groups::Silhouette => groups.extend(parts.iter().map(|p| u8::from(*p != u16::MAX))),
+            Groups::Parts => groups.extend(parts.iter().map(|p| group(*p))),
         }
     }
 }
@@ -152,11 +163,28 @@ impl Likelihood for RegionOf {
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
-        let (region, frame) = self.prepared(observed)?;
+        let region = self.region(observed)?;
+        let change = if self.outline() { None } else { self.view.frame_change(self.size) };
+        let following = |tally: &mut Tally, change: &FrameChange, groups: &mut Vec<u8>| {
+            let FrameChange { from, to, pixels, part, normal } = change;
+            self.fill_parts(part, groups);
+            let change = GroupChange { from, to, pixels, groups, normals: normal };
+            let whole = |count: &mut dyn FnMut(&[u8], &[[f32; 3]])| {
+                let (frame, mut groups) = (self.frame(), Vec::new());
+                self.fill(&frame, &mut groups);
+                count(&groups, &frame.normal);
+            };
+            region.log_likelihood_following(&change, whole, tally)
+        };
         Ok(GROUPS.with_borrow_mut(|groups| {
-            self.fill(&frame, groups);
-            let score = |tally: &mut _| region.log_likelihood_after(groups, &frame.normal, tally);
-            self.tally.with(&region, score)
+            self.tally.with(&region, |tally| match &change {
+                Some(change) => following(tally, change, groups),
+                None => {
+                    let frame = self.frame();
+                    self.fill(&frame, groups);
+                    region.log_likelihood_after(groups, &frame.normal, tally)
+                }
+            })
         }))
     }
 
@@ -167,8 +195,8 @@ impl Likelihood for RegionOf {
         if !self.is_proper() {
             return None;
         }
-        let draw = |(region, frame): (Arc<Region>, Arc<Frame>)| {
-            let mut groups = Vec::new();
+        let draw = |region: Arc<Region>| {
+            let (frame, mut groups) = (self.frame(), Vec::new());
             self.fill(&frame, &mut groups);
             let labels = region.simulate(&groups, rng);
             let wrong = |e| format!("scene.region: {e}");
@@ -180,13 +208,13 @@ impl Likelihood for RegionOf {
             value.regions.get((self.options.clone(), frame.width, frame.height), |_| Ok(other))?;
             Ok(Value::object(value))
         };
-        Some(self.prepared(observed).and_then(draw))
+        Some(self.region(observed).and_then(draw))
     }
 
     /// With respect to the view, if the likelihood depends on the silhouette only.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
-        let (region, frame) = self.prepared(observed).ok().filter(|_| self.outline())?;
-        let groups: Vec<u8> = frame.mask().map(u8::from).collect();
+        let region = self.region(observed).ok().filter(|_| self.outline())?;
+        let groups: Vec<u8> = self.frame().mask().map(u8::from).collect();
         Some(by_silhouette(&self.view, self.size, &region.gains(&groups)))
     }
 

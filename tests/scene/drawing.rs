@@ -103,6 +103,13 @@ fn bits(c: &Contours) -> Vec<u32> {
         .collect()
 }
 
+/// Returns every bit of a frame.
+fn frame_bits(f: &Frame) -> Vec<u32> {
+    let depth = f.depth.iter().map(|d| d.to_bits());
+    let normals = f.normal.iter().flatten().map(|v| v.to_bits());
+    depth.chain(f.part.iter().map(|p| u32::from(*p))).chain(normals).collect()
+}
+
 /// Hashes words by Fowler, Noll and Vo's FNV-1a.
 fn hash(words: impl IntoIterator<Item = u32>, from: u64) -> u64 {
     words.into_iter().fold(from, |h, w| (h ^ u64::from(w)).wrapping_mul(0x100000001b3))
@@ -133,7 +140,7 @@ fn contours_and_depth_are_as_they_were() {
 
 #[test]
 fn what_was_drawn_before_changes_nothing() {
-    let mut random = Uniform(42);
+    let (mut random, mut listed) = (Uniform(42), 0);
     for _ in 0..12 {
         let cameras = [camera(&mut random), camera(&mut random)];
         let mut meshes: Vec<_> = (0..3 + random.below(20)).map(|_| part(&mut random)).collect();
@@ -163,12 +170,24 @@ fn what_was_drawn_before_changes_nothing() {
             // What is requested first changes nothing either.
             let depth = (random.next() < 0.3).then(|| view.depth(size));
             let change = (random.next() < 0.5).then(|| view.change(size).count);
+            let colours = (random.next() < 0.5).then(|| view.frame_change(size));
             let (here, there) = (view.contours(size), Contours::of(&solid, &camera));
             assert_eq!(bits(&here), bits(&there));
             assert!(change.is_none_or(|count| count == there.len()));
             let frame = Frame::render(&solid, &camera, Channels::Depth);
             assert!(depth.is_none_or(|depth| *depth == frame));
             assert_eq!(*view.depth(size), frame);
+            if let Some(colours) = colours {
+                let here = (frame_bits(&view.frame(size)), colours.as_deref());
+                let there = Frame::render(&solid, &camera, Channels::All);
+                assert_eq!(here.0, frame_bits(&there));
+                for (i, pixel) in here.1.iter().flat_map(|c| c.pixels.iter().enumerate()) {
+                    let change = colours.as_deref().unwrap();
+                    let now = (change.part[i], change.normal[i]);
+                    assert_eq!(now, (there.part[*pixel as usize], there.normal[*pixel as usize]));
+                    listed += 1;
+                }
+            }
             // A view with a frame uses the depth of that frame.
             let framed = View::new(solid, camera);
             framed.frame(size);
@@ -179,6 +198,7 @@ fn what_was_drawn_before_changes_nothing() {
             }
         }
     }
+    assert!(listed > 10_000, "{listed}");
 }
 
 #[test]

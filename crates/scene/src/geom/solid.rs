@@ -114,7 +114,7 @@ impl Meshes {
     }
 
     /// The number of part numbers in use.
-    fn part_count(&self) -> u16 {
+    pub fn part_count(&self) -> u16 {
         let after = |i: &Instance| i.first_part.saturating_add(i.mesh.topology.part_count);
         self.iter().map(after).max().unwrap_or(0)
     }

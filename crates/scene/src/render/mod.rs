@@ -28,7 +28,7 @@ use pcadlang_numerics::num::simd;
 pub use crate::contours::{ContourChange, ContourSlice, Contours};
 pub use batch::{BatchRenderer, ContourBatch, Cores, Scene};
 pub use camera::{Camera, CameraError, Projection};
-pub use pixels::frame::{Channels, Frame};
+pub use pixels::frame::{Channels, Frame, FrameChange};
 pub use pixels::shade::shade;
 pub use revolution::RevolutionGradient;
 pub use view::View;

@@ -8,8 +8,10 @@
 
 mod gradient;
 mod reverse;
+mod stationary;
 
 use self::reverse::Reverse;
+use self::stationary::Stationary;
 use super::elements::{ComparatorError, Element, check};
 use super::field::{CHANNELS, Edges, PER_RADIAN, channels_of, turn_between};
 use super::pictures::contour_map::ContourMap;
@@ -114,6 +116,8 @@ impl Steps {
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     steps: Steps,
+    /// Of the other direction, if symmetric.
+    back: Stationary,
     of: Option<Arc<()>>,
 }
 
@@ -214,12 +218,12 @@ impl Chamfer {
     }
 
     /// Returns the [`Chamfer::log_likelihood`] after a change of the contours, bit for
-    /// bit. If the tally holds the state before the change, only the changes are counted
-    /// (unless symmetric); otherwise `whole` must give all contours.
+    /// bit. If the tally holds the state before the change, only the changes are counted;
+    /// otherwise `whole` must give all contours.
     pub fn log_likelihood_after<'a>(
         &self,
         step: &ContourChange,
-        whole: impl Fn() -> ContourSlice<'a>,
+        whole: impl FnOnce() -> ContourSlice<'a>,
         tally: &mut Tally,
         scratch: &mut Scratch,
     ) -> f64 {
@@ -230,16 +234,31 @@ impl Chamfer {
             if step.follows(tally.of.as_ref()) {
                 self.count(&step.removed.slice(), -1, &mut tally.steps);
                 self.count(&step.added.slice(), 1, &mut tally.steps);
+                if let Some(reverse) = &self.reverse {
+                    let changes = [&step.removed, &step.added].map(|c| c.slice());
+                    tally.back.follow(reverse, changes, self.turn());
+                }
             } else {
+                let (whole, moving) = (whole(), step.moving.slice());
                 tally.steps = Steps::default();
-                self.count(&whole(), 1, &mut tally.steps);
-                self.count(&step.moving.slice(), -1, &mut tally.steps);
+                self.count(&whole, 1, &mut tally.steps);
+                self.count(&moving, -1, &mut tally.steps);
+                if let Some(reverse) = &self.reverse {
+                    tally.back.begin(reverse, &whole, &moving, self.turn());
+                }
             }
             tally.of = Some(step.to.clone());
         }
-        let mut steps = tally.steps;
-        self.count(&step.moving.slice(), 1, &mut steps);
-        let back = self.reverse.as_ref().and_then(|_| self.back(&whole(), scratch));
+        let (mut steps, moving) = (tally.steps, step.moving.slice());
+        self.count(&moving, 1, &mut steps);
+        let back = self.reverse.as_ref().map(|reverse| {
+            let mut sums = ChamferSums::default();
+            let distances = tally.back.with_moving(reverse, &moving, self.turn());
+            for (point, distance) in reverse.points().iter().zip(distances) {
+                self.add_back(&mut sums, reverse.length(point), *distance);
+            }
+            sums
+        });
         self.score(steps.sums(), back)
     }
 
@@ -348,10 +367,16 @@ impl Chamfer {
         let reverse = self.reverse.as_ref()?;
         let mut sums = ChamferSums::default();
         reverse.each(elements, self.turn(), scratch, |length, distance, _| {
-            let distance = (f64::from(distance) * self.percent).min(NOTHING);
-            sums.add(f64::from(length) * self.percent, self.cut(distance as f32));
+            self.add_back(&mut sums, length, distance);
         });
         Some(sums)
+    }
+
+    /// Adds an observed point, of a length and at a distance in pixels.
+    #[inline(always)]
+    fn add_back(&self, sums: &mut ChamferSums, length: f32, distance: f32) {
+        let distance = (f64::from(distance) * self.percent).min(NOTHING);
+        sums.add(f64::from(length) * self.percent, self.cut(distance as f32));
     }
 
     /// The cost in pixels of a difference of one orientation channel.

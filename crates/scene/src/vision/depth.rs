@@ -5,6 +5,10 @@
 //! surface) and NaN is missing (not measured). Missing pixels are ignored: whether a
 //! pixel is missing is assumed to be independent of the scene.
 
+mod tally;
+
+pub use self::tally::DepthTally;
+
 use super::error::{VisionError, read_bytes};
 use super::pictures::npy;
 use super::pictures::photo::{Limits, decode_dynamic};
@@ -121,6 +125,20 @@ pub struct DepthLikelihood {
     sd: f64,
     outlier: f64,
     range: (f64, f64),
+    logs: Logs,
+}
+
+/// Logarithms of the parameters.
+#[derive(Clone, Copy, Debug)]
+struct Logs {
+    /// Of the standard deviation, and of the probability of an inlier.
+    sd: f64,
+    inlier: f64,
+    /// Of the probability of an outlier that is background; of the density of any other.
+    background: f64,
+    outlier: f64,
+    /// Of the probability of background where it is rendered.
+    empty: f64,
 }
 
 impl DepthLikelihood {
@@ -148,7 +166,15 @@ impl DepthLikelihood {
         if let Some(&v) = observed.data.iter().find(outside) {
             return fail("every observed depth", "within the range of depths", f64::from(v));
         }
-        Ok(DepthLikelihood { observed: observed.clone(), sd, outlier, range })
+        let background = libm::log(0.5 * outlier);
+        let logs = Logs {
+            sd: libm::log(sd),
+            inlier: libm::log1p(-outlier),
+            background,
+            outlier: background - libm::log(far - near),
+            empty: libm::log1p(-0.5 * outlier),
+        };
+        Ok(DepthLikelihood { observed: observed.clone(), sd, outlier, range, logs })
     }
 
     /// Returns the likelihood at the rendered size (nearest pixels).
@@ -169,14 +195,21 @@ impl DepthLikelihood {
         width: u32,
         height: u32,
     ) -> Result<f64, VisionError> {
+        self.log_likelihood_after(rendered, width, height, &mut DepthTally::default())
+    }
+
+    /// [`DepthLikelihood::log_likelihood`], bit for bit, computed only at the pixels whose
+    /// rendered depth differs from that in the picture before. A tally belongs to one
+    /// likelihood.
+    pub fn log_likelihood_after(
+        &self,
+        rendered: &[f32],
+        width: u32,
+        height: u32,
+        tally: &mut DepthTally,
+    ) -> Result<f64, VisionError> {
         self.check(rendered, width, height)?;
-        Ok(self
-            .observed
-            .data
-            .iter()
-            .zip(rendered)
-            .map(|(&o, &r)| self.log_density(f64::from(o), f64::from(r)))
-            .sum())
+        Ok(tally.follow(self, rendered))
     }
 
     /// Returns for each pixel the derivative of the log density with respect to its
@@ -188,7 +221,7 @@ impl DepthLikelihood {
                 return 0.0;
             }
             let z = (o - r) / self.sd;
-            let good = libm::log1p(-self.outlier) - 0.5 * z * z - libm::log(self.sd) - LN_SQRT_2PI;
+            let good = self.logs.inlier - 0.5 * z * z - self.logs.sd - LN_SQRT_2PI;
             let share = libm::exp(good - self.log_density(o, r));
             // Where the responsibility of the normal part is 0, z may be infinite.
             if share > 0.0 { share * z / self.sd } else { 0.0 }
@@ -215,19 +248,17 @@ impl DepthLikelihood {
 
     /// Returns the log density of an observed depth given a rendered one.
     fn log_density(&self, observed: f64, rendered: f64) -> f64 {
-        let ln_half = libm::log(0.5 * self.outlier);
         if observed.is_nan() {
             return 0.0;
         }
         match (observed.is_finite(), rendered.is_finite()) {
-            (false, false) => libm::log1p(-0.5 * self.outlier),
-            (false, true) => ln_half,
-            (true, false) => ln_half - libm::log(self.range.1 - self.range.0),
+            (false, false) => self.logs.empty,
+            (false, true) => self.logs.background,
+            (true, false) => self.logs.outlier,
             (true, true) => {
                 let z = (observed - rendered) / self.sd;
-                let good =
-                    libm::log1p(-self.outlier) - 0.5 * z * z - libm::log(self.sd) - LN_SQRT_2PI;
-                let odd = ln_half - libm::log(self.range.1 - self.range.0);
+                let good = self.logs.inlier - 0.5 * z * z - self.logs.sd - LN_SQRT_2PI;
+                let odd = self.logs.outlier;
                 let (most, least) = if good > odd { (good, odd) } else { (odd, good) };
                 most + libm::log1p(libm::exp(least - most))
             }
@@ -243,13 +274,14 @@ impl DepthLikelihood {
                 format!("{width} x {height} ({} pixels)", rendered.len()),
             ));
         }
-        match rendered.iter().find(|v| v.is_nan()) {
-            Some(&v) => Err(VisionError::Range {
+        // Without an early end, so that it vectorises.
+        match rendered.iter().fold(false, |any, v| any | v.is_nan()) {
+            true => Err(VisionError::Range {
                 name: "rendered depth",
                 rule: "a number",
-                value: f64::from(v),
+                value: f64::NAN,
             }),
-            None => Ok(()),
+            false => Ok(()),
         }
     }
 
@@ -322,6 +354,34 @@ mod tests {
         assert!(l.log_likelihood(&[1e30, -1e30, 0.0, 0.0, 0.0, 1e38], 6, 1).unwrap().is_finite());
         assert!(l.log_likelihood(&[f32::NAN; 6], 6, 1).is_err());
         assert!(l.log_likelihood(&[1.0; 6], 3, 2).is_err());
+    }
+
+    #[test]
+    fn a_tally_follows_rendered_maps_bit_for_bit() {
+        let mut rng = StreamKey::new(5, 0, Purpose::PREDICT).stream(0, 0, 0);
+        let mut depth = |lost: bool| match rng.index(5) {
+            0 => INF,
+            1 if lost => f32::NAN,
+            _ => 0.5 + 4.0 * rng.uniform() as f32,
+        };
+        let n = 1000;
+        let l = likelihood((0..n).map(|_| depth(true)).collect());
+        let (mut tally, mut rendered) = (DepthTally::default(), vec![INF; n]);
+        for step in 0..40 {
+            for i in 0..[0, 1, 30, 900][step % 4] {
+                rendered[(37 * step + i) % n] = depth(false);
+            }
+            let got = l.log_likelihood_after(&rendered, n as u32, 1, &mut tally).unwrap();
+            let plain = l.log_likelihood(&rendered, n as u32, 1).unwrap();
+            assert_eq!(got.to_bits(), plain.to_bits());
+            let mut odd = rendered.clone();
+            odd[step] = f32::NAN;
+            assert!(l.log_likelihood_after(&odd, n as u32, 1, &mut tally).is_err());
+            let one_by_one: f64 = (l.observed.data.iter().zip(&rendered))
+                .map(|(o, r)| l.log_density(f64::from(*o), f64::from(*r)))
+                .sum();
+            assert!((plain - one_by_one).abs() < 1e-9 * one_by_one.abs());
+        }
     }
 
     #[test]

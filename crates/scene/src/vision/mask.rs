@@ -151,10 +151,19 @@ impl MaskLikelihood {
         height: u32,
     ) -> Result<f64, VisionError> {
         self.check(rendered.len(), width, height)?;
-        let mut counts = [[0u64; 2]; 2];
-        for (&r, &o) in rendered.iter().zip(&self.observed.data) {
-            counts[usize::from(r)][usize::from(o)] += 1;
-        }
+        // In pieces whose counts fit into bytes, so that it vectorises.
+        let pieces = || rendered.chunks(255).zip(self.observed.data.chunks(255));
+        let count = |of: fn(bool, bool) -> bool| -> u64 {
+            let one = |(r, o): (&[bool], &[bool])| {
+                let count = |n: u8, (r, o): (&bool, &bool)| n + u8::from(of(*r, *o));
+                u64::from(r.iter().zip(o).fold(0, count))
+            };
+            pieces().map(one).sum()
+        };
+        let counts = [
+            [count(|r, o| !r & !o), count(|r, o| !r & o)],
+            [count(|r, o| r & !o), count(|r, o| r & o)],
+        ];
         Ok(counts[1][1] as f64 * libm::log1p(-self.eps_in)
             + counts[1][0] as f64 * libm::log(self.eps_in)
             + counts[0][1] as f64 * libm::log(self.eps_out)

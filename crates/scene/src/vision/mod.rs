@@ -28,7 +28,7 @@ mod testing;
 pub use crate::contours::{ContourChange, ContourSlice};
 pub use chamfer::{Chamfer, ChamferOptions, DistanceField};
 pub use contour_ratio::{ContourRatio, ContourRatioOptions};
-pub use depth::{DepthLikelihood, DepthMap};
+pub use depth::{DepthLikelihood, DepthMap, DepthTally};
 pub use detect::detector::{ContourDetector, GradientDetector};
 pub use detect::file_detector::{FileDetector, NetworkOptions};
 pub use detect::forest::Forest;

@@ -1,9 +1,10 @@
 //! A mesh that moves in front of the static layer: its layer at the current and the previous
 //! placement.
 
-use super::layer::{Layer, Tools, affine_bits};
+use super::layer::{Layer, Shows, Tools, affine_bits};
+use super::meshes::Member;
 use super::static_layer::StaticLayer;
-use crate::geom::{Instance, Mesh};
+use crate::geom::Mesh;
 use crate::render::lines::visibility::Depths;
 use crate::render::pixels::area::Area;
 use crate::render::pixels::project::DepthRange;
@@ -32,6 +33,8 @@ impl PlacedLayer {
 #[derive(Default)]
 pub struct DynamicMesh {
     pub index: usize,
+    /// The number of its first part among those of the solid.
+    pub first_part: u16,
     pub now: PlacedLayer,
     before: PlacedLayer,
     /// The pieces of the current layer that are visible.
@@ -46,15 +49,16 @@ impl DynamicMesh {
         DynamicMesh { index, ..DynamicMesh::default() }
     }
 
-    /// Moves it to an instance's mesh and placement, drawing a layer unless the current
+    /// Moves it to a member's mesh and placement, drawing a layer unless the current
     /// or the previous one fits. Nothing is drawn of a mesh that `behind` hides.
     pub fn move_to(
         &mut self,
-        instance: &Instance,
-        (camera, contours): (&Camera, bool),
+        Member { instance, first_part, .. }: &Member<'_>,
+        (camera, shows): (&Camera, Shows),
         tools: &mut Tools,
         behind: Option<&StaticLayer>,
     ) {
+        self.first_part = *first_part;
         let affine = affine_bits(&instance.affine);
         let is_it = |own: &PlacedLayer| {
             let hides = |known| behind.is_some_and(|b| Arc::ptr_eq(known, &b.prepared));
@@ -76,7 +80,7 @@ impl DynamicMesh {
             *hidden_by = by.map(|b| Arc::clone(&b.prepared));
             by.is_some()
         };
-        layer.draw(instance, (camera, contours), tools, hidden);
+        layer.draw(instance, (camera, shows), tools, hidden);
         (self.now.mesh, self.now.affine) = (Arc::downgrade(&instance.mesh), affine);
     }
 

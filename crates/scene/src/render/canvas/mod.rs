@@ -10,20 +10,22 @@
 //! Invariant: a picture depends on the solid and the camera alone, bit for bit: a canvas
 //! only saves work.
 
+mod channels;
 mod dynamic_mesh;
 mod layer;
 mod meshes;
 mod picture;
+mod static_channels;
 mod static_layer;
 
-use self::layer::{Tools, camera_bits};
+use self::layer::{Shows, Tools, camera_bits};
 use self::picture::Picture;
-use super::{Camera, ContourChange, Contours};
+use super::{Camera, ContourChange, Contours, Frame, FrameChange};
 use crate::geom::Solid;
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
-/// The number of pictures that a canvas keeps: several cameras or sizes, with contours or
-/// with depth alone.
+/// The number of pictures that a canvas keeps: several cameras or sizes, with contours, with
+/// all channels, or with depth alone.
 const PICTURES: usize = 4;
 
 /// A shared canvas. Clones draw on the same one; a new canvas is empty.
@@ -57,20 +59,45 @@ impl Canvas {
 
     /// The contours of a solid in a camera's picture, as [`Contours::of`].
     pub fn contours(&self, solid: &Solid, camera: &Camera) -> Contours {
-        self.shown(solid, (camera, true), |picture| picture.contours(camera))
+        self.shown(solid, (camera, Shows::Contours), |picture| picture.contours(camera))
             .unwrap_or_else(|| Contours::of(solid, camera))
     }
 
     /// The depth of a solid, row by row, in the picture with contours or in that without;
     /// `None` if it is better drawn in full.
     pub(super) fn depth(&self, solid: &Solid, camera: &Camera, contours: bool) -> Option<Vec<f32>> {
-        self.shown(solid, (camera, contours), |picture| picture.depth().to_vec())
+        let shows = if contours { Shows::Contours } else { Shows::Depth };
+        self.shown(solid, (camera, shows), |picture| picture.depth().to_vec())
+    }
+
+    /// All channels of a solid; `None` if it is better drawn in full.
+    pub(super) fn frame(&self, solid: &Solid, camera: &Camera) -> Option<Frame> {
+        self.shown(solid, (camera, Shows::Channels), |picture| {
+            let (depth, channels) = (picture.depth().to_vec(), picture.channels());
+            let (part, normal) = (channels.part.clone(), channels.normal.clone());
+            Frame { width: camera.width, height: camera.height, depth, part, normal }
+        })
+    }
+
+    /// The change from the previous parts and normals; `None` if the solid is better drawn
+    /// in full.
+    pub(super) fn frame_change(&self, solid: &Solid, camera: &Camera) -> Option<FrameChange> {
+        self.with_picture((camera, Shows::Channels), |picture, tools| {
+            let ContourChange { from, to, .. } = picture.draw(solid, camera, tools)?;
+            let channels = picture.channels();
+            let at = || channels.changed.iter().map(|pixel| *pixel as usize);
+            let part = at().map(|at| channels.part[at]).collect();
+            let normal = at().map(|at| channels.normal[at]).collect();
+            Some(FrameChange { from, to, pixels: channels.changed.clone(), part, normal })
+        })
     }
 
     /// The change from the previous contours in this picture; `None` if the solid is
     /// better drawn in full.
     pub(super) fn change(&self, solid: &Solid, camera: &Camera) -> Option<ContourChange> {
-        self.with_picture((camera, true), |picture, tools| picture.draw(solid, camera, tools))
+        self.with_picture((camera, Shows::Contours), |picture, tools| {
+            picture.draw(solid, camera, tools)
+        })
     }
 
     /// Takes something from the picture that shows a solid, which is drawn only if it is
@@ -78,10 +105,10 @@ impl Canvas {
     fn shown<T>(
         &self,
         solid: &Solid,
-        (camera, contours): (&Camera, bool),
+        (camera, shows): (&Camera, Shows),
         take: impl FnOnce(&Picture) -> T,
     ) -> Option<T> {
-        self.with_picture((camera, contours), |picture, tools| {
+        self.with_picture((camera, shows), |picture, tools| {
             if !picture.shows(solid) {
                 picture.draw(solid, camera, tools)?;
             }
@@ -91,17 +118,17 @@ impl Canvas {
 
     fn with_picture<T>(
         &self,
-        (camera, contours): (&Camera, bool),
+        (camera, shows): (&Camera, Shows),
         work: impl FnOnce(&mut Picture, &mut Tools) -> Option<T>,
     ) -> Option<T> {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let Pictures { pictures, tools } = &mut *all;
         let eye = camera_bits(camera);
-        match pictures.iter().position(|p| p.is_of(&eye, contours)) {
+        match pictures.iter().position(|p| p.is_of(&eye, shows)) {
             Some(at) => pictures[..=at].rotate_right(1),
             None => {
                 pictures.truncate(PICTURES - 1);
-                pictures.insert(0, Picture::new(eye, contours));
+                pictures.insert(0, Picture::new(eye, shows));
             }
         }
         work(pictures.first_mut()?, tools.get_or_insert_default())

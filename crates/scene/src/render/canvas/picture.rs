@@ -4,11 +4,12 @@
 //! relies on the depth tests being monotone, in `f64` too: a piece hidden by another mesh
 //! or at a smaller depth range stays hidden with both.
 
+use super::channels::ShownChannels;
 use super::dynamic_mesh::DynamicMesh;
-use super::layer::{Layer, Tools};
-use super::meshes::Meshes;
+use super::layer::{Layer, Shows, Tools};
+use super::meshes::{Member, Meshes, members};
 use super::static_layer::StaticLayer;
-use crate::geom::{Instance, Solid};
+use crate::geom::Solid;
 use crate::render::lines::visibility::Depths;
 use crate::render::pixels::area::Area;
 use crate::render::simd::vectorised;
@@ -28,10 +29,9 @@ const PATIENCE: u64 = 1024;
 
 /// The state of one camera's picture.
 pub(super) struct Picture {
-    /// The bits of the camera, which identify the picture, and whether it has contours, not
-    /// only depth.
+    /// The bits of the camera, and what is shown, which identify the picture.
     camera: [u64; 17],
-    contours: bool,
+    shows: Shows,
     /// The meshes shown.
     shown: Meshes,
     /// The meshes of the last solid most of which was not shown.
@@ -39,6 +39,7 @@ pub(super) struct Picture {
     dynamic: Vec<DynamicMesh>,
     static_layer: Option<StaticLayer>,
     depth: Vec<f32>,
+    channels: ShownChannels,
     extent: f64,
     /// The number of drawings so far.
     clock: u64,
@@ -61,16 +62,17 @@ pub(super) struct Picture {
 }
 
 impl Picture {
-    /// A picture without meshes, with or without contours; nothing is drawn yet.
-    pub fn new(camera: [u64; 17], contours: bool) -> Picture {
+    /// A picture without meshes; nothing is drawn yet.
+    pub fn new(camera: [u64; 17], shows: Shows) -> Picture {
         Picture {
             camera,
-            contours,
+            shows,
             shown: Meshes::default(),
             last: Meshes::default(),
             dynamic: Vec::new(),
             static_layer: None,
             depth: Vec::new(),
+            channels: ShownChannels::default(),
             extent: 0.0,
             clock: 0,
             swept: 0,
@@ -86,9 +88,9 @@ impl Picture {
         }
     }
 
-    /// Whether it is the picture of the camera with these bits, with or without contours.
-    pub fn is_of(&self, camera: &[u64; 17], contours: bool) -> bool {
-        self.contours == contours && self.camera == *camera
+    /// Whether it is the picture of the camera with these bits that shows this.
+    pub fn is_of(&self, camera: &[u64; 17], shows: Shows) -> bool {
+        self.shows == shows && self.camera == *camera
     }
 
     /// Whether it shows just this solid.
@@ -101,6 +103,11 @@ impl Picture {
     /// Depth, row by row.
     pub fn depth(&self) -> &[f32] {
         &self.depth
+    }
+
+    /// Parts and normals, and at which pixels they changed in the last drawing.
+    pub fn channels(&self) -> &ShownChannels {
+        &self.channels
     }
 
     /// Shows a solid and returns the change. `None` if the solid is better drawn in full:
@@ -116,7 +123,7 @@ impl Picture {
         if self.refused == Some(count) {
             return None;
         }
-        let most = |some: &[(usize, &Instance)]| 2 * some.len() > count;
+        let most = |some: &[Member<'_>]| 2 * some.len() > count;
         let changed = self.shown.changed(solid);
         if most(&changed) {
             // The picture shows something else. Whether it is worth showing this solid
@@ -149,17 +156,18 @@ impl Picture {
             return None;
         }
         self.shown.set(solid, &changed);
+        self.channels.changed.clear();
         let static_layer = self.static_layer.as_mut()?;
         self.areas.clear();
         if known {
             work::count(|work| work.kept += (count - changed.len()) as u64);
-            for (index, instance) in &changed {
-                let found = self.dynamic.binary_search_by_key(index, |m| m.index);
+            for member in &changed {
+                let found = self.dynamic.binary_search_by_key(&member.index, |m| m.index);
                 let Some(mesh) = found.ok().and_then(|at| self.dynamic.get_mut(at)) else {
                     continue;
                 };
                 self.areas.push(mesh.now.layer.area);
-                mesh.move_to(instance, (camera, self.contours), tools, Some(static_layer));
+                mesh.move_to(member, (camera, self.shows), tools, Some(static_layer));
                 self.areas.push(mesh.now.layer.area);
             }
         }
@@ -178,8 +186,8 @@ impl Picture {
     }
 
     /// Counts meshes as moving from now on.
-    fn mark(&mut self, moved: &[(usize, &Instance)]) {
-        for (index, _) in moved {
+    fn mark(&mut self, moved: &[Member<'_>]) {
+        for Member { index, .. } in moved {
             let at = match self.dynamic.binary_search_by_key(index, |m| m.index) {
                 Ok(at) => at,
                 Err(at) => {
@@ -226,9 +234,9 @@ impl Picture {
     /// Draws all moving meshes for which nothing was drawn.
     fn move_all(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) {
         let mut dynamic = self.dynamic.iter_mut().peekable();
-        for (index, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
-            if let Some(mesh) = dynamic.next_if(|m| m.index == index) {
-                mesh.move_to(instance, (camera, self.contours), tools, None);
+        for member in members(solid) {
+            if let Some(mesh) = dynamic.next_if(|m| m.index == member.index) {
+                mesh.move_to(&member, (camera, self.shows), tools, None);
             }
         }
     }
@@ -253,16 +261,22 @@ impl Picture {
         let mut static_layer = StaticLayer::new(camera);
         let (whole, width) = (Area::whole(camera), camera.width as usize);
         let mut dynamic = self.dynamic.iter_mut().peekable();
-        for (index, instance) in solid.lists().flat_map(|list| list.iter()).enumerate() {
-            if let Some(mesh) = dynamic.next_if(|m| m.index == index) {
-                mesh.move_to(instance, (camera, self.contours), tools, None);
+        if self.shows == Shows::Channels {
+            static_layer.channels.clear(camera);
+        }
+        for member in members(solid) {
+            if let Some(mesh) = dynamic.next_if(|m| m.index == member.index) {
+                mesh.move_to(&member, (camera, self.shows), tools, None);
                 continue;
             }
             let layer = &mut self.scratch;
-            layer.draw(instance, (camera, self.contours), tools, |_, _| false);
+            layer.draw(member.instance, (camera, self.shows), tools, |_, _| false);
             layer.show(&mut static_layer.depth, width, &whole);
+            if self.shows == Shows::Channels {
+                static_layer.channels.put(&member, layer, width);
+            }
             static_layer.range = static_layer.range.and(&layer.range);
-            static_layer.pieces.extend(layer.pieces.iter().map(|piece| (*piece, index)));
+            static_layer.pieces.extend(layer.pieces.iter().map(|piece| (*piece, member.index)));
             if static_layer.pieces.len() > MOST_PIECES {
                 return None;
             }
@@ -273,7 +287,7 @@ impl Picture {
 
     /// Composes the whole picture and tests all pieces.
     fn begin(&mut self, camera: &Camera) -> Option<ContourChange> {
-        let Picture { static_layer, dynamic, depth, extent, .. } = self;
+        let Picture { static_layer, dynamic, depth, channels, extent, clock, .. } = self;
         let static_layer = static_layer.as_mut()?;
         work::count(|work| {
             work.partial += 1;
@@ -283,6 +297,12 @@ impl Picture {
         dynamic
             .iter()
             .for_each(|m| m.now.layer.show(depth, camera.width as usize, &Area::whole(camera)));
+        if self.shows == Shows::Channels {
+            channels.begin(camera);
+            let area = (camera, &Area::whole(camera));
+            channels.compose(area, &static_layer.channels, dynamic, *clock);
+            channels.changed.clear();
+        }
         let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
         self.still = static_layer.test_all(&depths);
         dynamic.iter_mut().for_each(|mesh| mesh.look(&depths));
@@ -313,7 +333,18 @@ impl Picture {
         let clock = self.clock;
         let moved = |m: &DynamicMesh| m.moved == clock;
         let anything = !same_extent || self.dynamic.iter().any(moved);
-        let Picture { static_layer, dynamic, depth, extent, rows, pixels, areas, again, .. } = self;
+        let Picture {
+            static_layer,
+            dynamic,
+            depth,
+            channels,
+            extent,
+            rows,
+            pixels,
+            areas,
+            again,
+            ..
+        } = self;
         let (static_layer, width) = (static_layer.as_mut()?, camera.width as usize);
         Area::join(areas);
         work::count(|work| {
@@ -337,6 +368,9 @@ impl Picture {
                 there.copy_from_slice(static_layer);
             }
             vectorised(|| dynamic.iter().for_each(|m| m.now.layer.show(depth, width, area)));
+            if self.shows == Shows::Channels {
+                channels.compose((camera, area), &static_layer.channels, dynamic, clock);
+            }
             if !anything_still {
                 continue;
             }

@@ -147,9 +147,9 @@ impl Candidates {
                     #[inline(always)]
                     |row, from, outside| {
                         let at = (row - area.top) * width + from - area.left;
-                        if bitmap.is_some_and(|bitmap| {
-                            bitmap.window(at, LANES) as u32 & !outside.to_bitmask() == 0
-                        }) {
+                        let wanted = bitmap.map_or(u32::MAX, |b| b.window(at, LANES) as u32);
+                        // Many small triangles lie between the centres of pixels.
+                        if wanted & !outside.to_bitmask() & ((1 << LANES) - 1) == 0 {
                             return;
                         }
                         let corners =

@@ -8,13 +8,14 @@ use crate::geom::{Mesh, Solid};
 use crate::render::pixels::area::Area;
 use crate::render::pixels::candidates::Candidates;
 use crate::render::pixels::place::Point;
-use crate::render::pixels::project::{Lens, Placement, Projected, project};
+use crate::render::pixels::project::{Lens, Placement, Projected, Vertices, project};
 use crate::render::pixels::raster::{WHOLE, cut_triangles, draw_nearness, empty, fill_faces};
 use crate::render::pixels::triangle::area;
 use crate::render::simd::vectorised;
 use crate::render::{Camera, work};
 use glam::{DVec3, Vec3};
 use std::cell::RefCell;
+use std::sync::Arc;
 
 /// Which channels to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +39,23 @@ pub struct Frame {
     pub part: Vec<u16>,
     /// Unit normal in the camera's frame (x right, y up, z towards the camera), on the
     /// visible side of the surface; zero off the object. Empty when only depth was drawn.
+    pub normal: Vec<[f32; 3]>,
+}
+
+/// A change from one frame to another, at the pixels whose part or normal differs. A frame is
+/// identified by the address of its `Arc`.
+#[derive(Debug)]
+pub struct FrameChange {
+    /// Identifies the frame before. If it is unknown, a new identity that nobody holds, and
+    /// no pixels are listed.
+    pub from: Arc<()>,
+    /// Identifies the frame now.
+    pub to: Arc<()>,
+    /// The pixels, numbered row by row, each once.
+    pub pixels: Vec<u32>,
+    /// Their parts now, as in [`Frame`].
+    pub part: Vec<u16>,
+    /// Their normals now.
     pub normal: Vec<[f32; 3]>,
 }
 
@@ -77,20 +95,26 @@ impl Frame {
         work::count(|work| work.whole += 1);
         solid.instances().iter().for_each(|i| work::drawn(&i.mesh));
         let (width, height) = (camera.width, camera.height);
-        let (mut depth, mut part, mut normal) = (Vec::new(), Vec::new(), Vec::new());
+        let mut pixels = ChannelPixels::default();
         match channels {
             Channels::Depth => {
-                draw_nearness(solid, camera, projected, candidates, &mut depth);
+                draw_nearness(solid, camera, projected, candidates, &mut pixels.nearness);
             }
             Channels::All => {
                 project(solid, camera, projected);
-                depth.resize(camera.pixels(), empty(camera));
-                part.resize(camera.pixels(), u16::MAX);
-                normal.resize(camera.pixels(), [0.0; 3]);
-                let scratch = (&*projected, candidates, shading);
-                draw_all(solid, camera, scratch, &mut depth, &mut part, &mut normal);
+                let whole = Area::whole(camera);
+                pixels.clear(camera, &whole);
+                for (i, instance) in solid.instances().iter().enumerate() {
+                    let placement = Placement::new(camera, &instance.affine);
+                    let (drawn, scratch) = (
+                        (&*instance.mesh, &placement, &projected.mesh(i)),
+                        (&mut *candidates, &mut *shading),
+                    );
+                    pixels.draw(drawn, instance.first_part, camera, scratch, &whole);
+                }
             }
         }
+        let ChannelPixels { nearness: mut depth, part, normal } = pixels;
         to_depth(camera, &mut depth);
         Frame { width, height, depth, part, normal }
     }
@@ -115,68 +139,112 @@ pub(in crate::render) fn to_depth(camera: &Camera, buffer: &mut [f32]) {
     );
 }
 
-/// Draws nearness, parts and normals of all meshes. For each mesh, the nearest face of
-/// each pixel is found first, so that the normal is computed once per pixel.
-fn draw_all(
-    solid: &Solid,
-    camera: &Camera,
-    (projected, candidates, shading): (&Projected, &mut Candidates, &mut Shading),
-    nearness: &mut [f32],
-    part: &mut [u16],
-    normal: &mut [[f32; 3]],
-) {
-    let (width, lens) = (camera.width as usize, Lens::new(camera));
-    let (bend, cx, cy) = (if lens.pinhole { 1.0 / lens.scale } else { 0.0 }, lens.cx, lens.cy);
-    // The normal at a pixel's centre, from its slope over the triangle.
-    let shade = |slope: &Slope, row: usize, column: usize| {
-        let (x, y) = (column as f64 + 0.5, row as f64 + 0.5);
-        let to_eye = DVec3::new((cx - x) * bend, (y - cy) * bend, 1.0).as_vec3();
-        seen_normal(slope.at(x, y).as_vec3(), to_eye)
-    };
-    for (i, instance) in solid.instances().iter().enumerate() {
-        let (mesh, placement) = (&instance.mesh, &Placement::new(camera, &instance.affine));
+/// The number of a part beyond which all parts are drawn as one.
+const LAST_PART: u16 = u16::MAX - 1;
+
+/// The number of a part among those of a solid, given its own one among those of its mesh.
+#[inline(always)]
+pub(in crate::render) fn part_number(own: u16, first_part: u16) -> u16 {
+    own.saturating_add(first_part).min(LAST_PART)
+}
+
+/// Nearness, parts and normals of an area, row by row; `u16::MAX` and 0 off the object.
+#[derive(Default)]
+pub(in crate::render) struct ChannelPixels {
+    pub nearness: Vec<f32>,
+    pub part: Vec<u16>,
+    pub normal: Vec<[f32; 3]>,
+}
+
+impl ChannelPixels {
+    /// Nothing is seen in an area.
+    pub fn clear(&mut self, camera: &Camera, area: &Area) {
+        let ChannelPixels { nearness, part, normal } = self;
+        nearness.clear();
+        nearness.resize(area.pixels(), empty(camera));
+        part.clear();
+        part.resize(area.pixels(), u16::MAX);
+        normal.clear();
+        normal.resize(area.pixels(), [0.0; 3]);
+    }
+
+    /// Draws a mesh where it is nearer than what is there. The pixels are those of `of`,
+    /// which must contain all pixels that the mesh can cover. The nearest face of each pixel
+    /// is found first, so that the normal is computed once per pixel.
+    pub fn draw(
+        &mut self,
+        (mesh, placement, vertices): (&Mesh, &Placement, &Vertices<'_>),
+        first_part: u16,
+        camera: &Camera,
+        (candidates, shading): (&mut Candidates, &mut Shading),
+        of: &Area,
+    ) {
+        let (width, lens) = (of.right - of.left, Lens::new(camera));
+        let ChannelPixels { nearness, part, normal } = self;
         let number = |face: usize| {
-            let own =
-                mesh.topology.parts.get(face).map_or(0, |p| p.saturating_add(instance.first_part));
-            own.min(u16::MAX - 1)
+            part_number(mesh.topology.parts.get(face).copied().unwrap_or(0), first_part)
         };
-        let vertices = projected.mesh(i);
-        if vertices.outside(camera) {
-            continue;
+        let eye = Eye::new(&lens);
+        let own = vertices.area(camera);
+        if vertices.outside(camera) || own.pixels() == 0 {
+            return;
         }
         if !vertices.whole {
-            cut_triangles(mesh, placement, camera, &vertices, |triangle, face, weights| {
+            cut_triangles(mesh, placement, camera, vertices, |triangle, face, weights| {
                 let slope =
                     Slope::new(mesh, placement, lens.pinhole, face, &triangle.points, weights);
                 let number = number(face);
                 triangle.runs(|run| {
                     for column in run.from..run.to {
-                        let (i, q) = (run.row * width + column, run.nearness(column));
+                        let i = (run.row - of.top) * width + column - of.left;
+                        let q = run.nearness(column);
                         if q > nearness[i] {
                             (nearness[i], part[i], normal[i]) =
-                                (q, number, shade(&slope, run.row, column));
+                                (q, number, eye.shade(&slope, run.row, column));
                         }
                     }
                 });
             });
-            continue;
+            return;
         }
-        let area = vertices.area(camera);
-        shading.begin(camera.pixels(), mesh.topology.triangles.len(), width, &area);
-        fill_faces(mesh, placement, camera, &vertices, candidates, nearness, &mut shading.faces);
-        for row in area.top..area.bottom {
-            for column in area.left..area.right {
-                let i = row * width + column;
+        shading.begin(of, mesh.topology.triangles.len(), &own);
+        let faces = &mut shading.faces;
+        fill_faces(mesh, placement, camera, vertices, candidates, of, (nearness, faces));
+        for row in own.top..own.bottom {
+            for column in own.left..own.right {
+                let i = (row - of.top) * width + column - of.left;
                 let face = shading.faces[i];
                 if face != NOWHERE {
                     let slope = shading.slope(face, |face| {
                         let points = vertices.corners(&mesh.topology, face);
                         Slope::new(mesh, placement, lens.pinhole, face as usize, &points, WHOLE)
                     });
-                    (part[i], normal[i]) = (number(face as usize), shade(slope, row, column));
+                    (part[i], normal[i]) = (number(face as usize), eye.shade(slope, row, column));
                 }
             }
         }
+    }
+}
+
+/// The directions from pixels to the camera.
+struct Eye {
+    bend: f64,
+    cx: f64,
+    cy: f64,
+}
+
+impl Eye {
+    fn new(lens: &Lens) -> Eye {
+        Eye { bend: if lens.pinhole { 1.0 / lens.scale } else { 0.0 }, cx: lens.cx, cy: lens.cy }
+    }
+
+    /// The normal at a pixel's centre, from its slope over the triangle.
+    #[inline(always)]
+    fn shade(&self, slope: &Slope, row: usize, column: usize) -> [f32; 3] {
+        let (x, y) = (column as f64 + 0.5, row as f64 + 0.5);
+        let to_eye =
+            DVec3::new((self.cx - x) * self.bend, (y - self.cy) * self.bend, 1.0).as_vec3();
+        seen_normal(slope.at(x, y).as_vec3(), to_eye)
     }
 }
 
@@ -186,7 +254,7 @@ const NOWHERE: u32 = u32::MAX;
 /// The nearest faces of one mesh, and how normals change over them. Reused from mesh to
 /// mesh.
 #[derive(Default)]
-struct Shading {
+pub(in crate::render) struct Shading {
     /// The face at each pixel where the mesh is nearest.
     faces: Vec<u32>,
     /// The index in `slopes` of each face, [`NOWHERE`] if its slope is not computed yet.
@@ -195,11 +263,13 @@ struct Shading {
 }
 
 impl Shading {
-    /// Clears all slopes, and the faces in an area; the mesh must lie inside that area.
-    fn begin(&mut self, pixels: usize, faces: usize, width: usize, area: &Area) {
-        self.faces.resize(pixels, NOWHERE);
-        for row in self.faces.chunks_exact_mut(width).take(area.bottom).skip(area.top) {
-            row[area.left..area.right].fill(NOWHERE);
+    /// Clears all slopes, and the faces in the part of an area in which the mesh lies.
+    fn begin(&mut self, of: &Area, faces: usize, own: &Area) {
+        let width = of.right - of.left;
+        self.faces.resize(of.pixels(), NOWHERE);
+        let rows = self.faces.chunks_exact_mut(width);
+        for row in rows.take(own.bottom - of.top).skip(own.top - of.top) {
+            row[own.left - of.left..own.right - of.left].fill(NOWHERE);
         }
         self.known.clear();
         self.known.resize(faces, NOWHERE);

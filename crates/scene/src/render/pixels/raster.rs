@@ -216,23 +216,22 @@ pub(in crate::render) fn fill_mesh(
     );
 }
 
-/// As [`fill_mesh`] in the whole image, for a mesh with all vertices beyond the near
-/// plane. Also writes the face into `faces` at each pixel where this mesh is nearer than
-/// `buffer`.
+/// As [`fill_mesh`], for a mesh with all vertices beyond the near plane. Also writes the
+/// face into `faces` at each pixel where this mesh is nearer than `buffer`.
 pub(in crate::render) fn fill_faces(
     mesh: &Mesh,
     placement: &Placement,
     camera: &Camera,
     vertices: &Vertices<'_>,
     candidates: &mut Candidates,
-    buffer: &mut [f32],
-    faces: &mut [u32],
+    area: &Area,
+    (buffer, faces): (&mut [f32], &mut [u32]),
 ) {
     let how = (size(camera.width, camera.height), back(mesh, placement, vertices));
-    let (area, topology) = (Area::whole(camera), &mesh.topology);
+    let topology = &mesh.topology;
     vectorised(
         #[inline(always)]
-        || candidates.fill::<true>(topology, vertices, how, (&area, None), buffer, faces),
+        || candidates.fill::<true>(topology, vertices, how, (area, None), buffer, faces),
     );
 }
 

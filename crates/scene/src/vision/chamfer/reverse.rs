@@ -43,6 +43,29 @@ pub(super) struct Piece {
     pub index: u32,
 }
 
+impl Piece {
+    /// The distance from an observed point, in pixels, with the costs of the piece and of
+    /// the difference in orientation.
+    #[inline(always)]
+    pub fn away(&self, point: &Piece, turn: f32) -> f32 {
+        let turned =
+            if turn > 0.0 { turn * turn_between(self.edge.turn, point.edge.turn) } else { 0.0 };
+        self.edge.distance(point.edge.x, point.edge.y) + turned + self.cost
+    }
+}
+
+/// The pieces that are in view. An element partly in view costs up to a diagonal more, so
+/// that elements do not appear suddenly.
+#[inline(always)]
+pub(super) fn pieces_of(elements: &ContourSlice<'_>, turn: f32) -> impl Iterator<Item = Piece> {
+    let diagonal = elements.diagonal() as f32;
+    elements.in_view().map(move |e| {
+        let turn = if turn > 0.0 { channel(e.tx, e.ty) } else { 0.0 };
+        let edge = Edge { x: e.x, y: e.y, tx: e.tx, ty: e.ty, half: 0.5 * e.length, turn };
+        Piece { edge, cost: (1.0 - e.weight) * diagonal, index: e.index as u32 }
+    })
+}
+
 /// The observed points sorted by bucket, in pixels of the frame.
 #[derive(Debug, Clone)]
 pub(super) struct Reverse {
@@ -133,9 +156,8 @@ impl Reverse {
 
     /// Calls `f(length, distance, pair)` for every observed point in a fixed order, where
     /// length and distance are in pixels and the pair is the point and the piece nearest
-    /// to it. `turn` is the cost in pixels of a difference of one orientation channel. An
-    /// element partly in view costs up to a diagonal more, so that elements do not appear
-    /// suddenly. With nothing in view, distances are infinite.
+    /// to it. `turn` is the cost in pixels of a difference of one orientation channel. With
+    /// nothing in view, distances are infinite.
     pub fn each(
         &self,
         elements: &ContourSlice<'_>,
@@ -144,13 +166,8 @@ impl Reverse {
         mut f: impl FnMut(f32, f32, Option<[&Piece; 2]>),
     ) {
         let Scratch { pieces, sorted, start, filled, near } = scratch;
-        let diagonal = elements.diagonal() as f32;
         pieces.clear();
-        pieces.extend(elements.in_view().map(|e| {
-            let turn = if turn > 0.0 { channel(e.tx, e.ty) } else { 0.0 };
-            let edge = Edge { x: e.x, y: e.y, tx: e.tx, ty: e.ty, half: 0.5 * e.length, turn };
-            Piece { edge, cost: (1.0 - e.weight) * diagonal, index: e.index as u32 }
-        }));
+        pieces.extend(pieces_of(elements, turn));
         // Pieces extend beyond their bucket by half their length, and by half a pixel at
         // the border.
         let slack = pieces.iter().map(|p| p.edge.half).fold(0.0, f32::max) + 1.0;
@@ -188,19 +205,24 @@ impl Reverse {
                         break;
                     }
                     for e in &sorted[start[c as usize] as usize..start[c as usize + 1] as usize] {
-                        let turned = if turn > 0.0 {
-                            turn * turn_between(e.edge.turn, p.edge.turn)
-                        } else {
-                            0.0
-                        };
-                        let distance = e.edge.distance(p.edge.x, p.edge.y) + turned + e.cost;
+                        let distance = e.away(p, turn);
                         if distance < best {
                             (best, nearest) = (distance, Some([p, e]));
                         }
                     }
                 }
-                f(2.0 * p.edge.half * self.stands_for, best, nearest);
+                f(self.length(p), best, nearest);
             }
         }
+    }
+
+    /// The observed points that are measured, in a fixed order.
+    pub fn points(&self) -> &[Piece] {
+        &self.points
+    }
+
+    /// The length in pixels that an observed point stands for.
+    pub fn length(&self, point: &Piece) -> f32 {
+        2.0 * point.edge.half * self.stands_for
     }
 }

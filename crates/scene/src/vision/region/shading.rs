@@ -42,87 +42,151 @@ fn terms([x, y, z]: [f64; 3]) -> [f64; TERMS] {
 /// whose group is not 0: linear in functions of the normal versus constant. It is 0 with
 /// fewer than two pixels. Pixels whose normal or brightness is not finite are ignored.
 pub(super) fn log_ratio(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32]) -> f64 {
-    let mut sums = Moments {
-        some: Pixels { numbers: [[0.0; SOME]; 4], count: 0 },
-        products: [[[0.0; LANES]; ALL]; ALL],
-    };
+    let mut sum = NONE;
+    let chunks = (groups.chunks(RUN * RUNS), normals.chunks(RUN * RUNS));
+    for ((groups, normals), brightness) in chunks.0.zip(chunks.1).zip(brightness.chunks(RUN * RUNS))
+    {
+        let mut of_runs = NONE;
+        let runs = groups.chunks(RUN).zip(normals.chunks(RUN)).zip(brightness.chunks(RUN));
+        for ((groups, normals), brightness) in runs {
+            // Most of a picture is background.
+            if any(groups) {
+                add(&mut of_runs, &products(groups, normals, brightness));
+            }
+        }
+        add(&mut sum, &of_runs);
+    }
+    from_products(&sum)
+}
+
+/// Number of pixels of a run, and of runs whose sums are added before all others. They fix
+/// the order of all additions, so that a changed pixel changes few sums.
+const RUN: usize = 32;
+const RUNS: usize = 32;
+/// Number of independent partial sums of a run. It is fixed, so that the result does not
+/// depend on the machine.
+const LANES: usize = 8;
+
+/// Sums over pixels of the products of (1, terms, brightness); only those on and above the
+/// diagonal are used.
+type Products = [[f64; ALL]; ALL];
+
+/// The sums over no pixels.
+const NONE: Products = [[0.0; ALL]; ALL];
+
+#[inline(always)]
+fn any(groups: &[u8]) -> bool {
+    groups.iter().fold(0, |any, g| any | g) != 0
+}
+
+fn add(to: &mut Products, from: &Products) {
     vectorised(
         #[inline(always)]
         || {
-            let lists = groups.chunks(SOME).zip(normals.chunks(SOME)).zip(brightness.chunks(SOME));
-            for ((groups, normals), brightness) in lists {
-                // Most of a picture is background.
-                if groups.iter().fold(0, |any, g| any | g) == 0 {
-                    continue;
-                }
-                for ((g, n), b) in groups.iter().zip(normals).zip(brightness) {
-                    if *g > 0 && (n[0] + n[1] + n[2] + b).is_finite() {
-                        sums.push(*n, *b);
-                    }
-                }
-            }
-            sums.add();
+            let lists = to.as_flattened_mut().iter_mut().zip(from.as_flattened());
+            lists.for_each(|(to, from)| *to += from);
         },
     );
-    from_products(&sums.products.map(|row| row.map(|lanes| lanes.iter().sum())))
 }
 
-/// Number of pixels whose products are summed at a time.
-const SOME: usize = 64;
-/// Number of independent partial sums. It is fixed, so that the result does not depend on
-/// the machine.
-const LANES: usize = 8;
-
-/// Normals and brightness of some pixels.
-struct Pixels {
-    /// x, y and z of the normals, and brightness.
-    numbers: [[f32; SOME]; 4],
-    count: usize,
+/// The sums over the pixels of a run.
+fn products(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32]) -> Products {
+    let mut sums = NONE;
+    vectorised(
+        #[inline(always)]
+        || {
+            // The pixels that count, side by side.
+            let (mut numbers, mut count) = ([[0.0f32; RUN]; 4], 0);
+            for ((g, n), b) in groups.iter().zip(normals).zip(brightness).take(RUN) {
+                let place = count & (RUN - 1);
+                [numbers[0][place], numbers[1][place], numbers[2][place]] = *n;
+                numbers[3][place] = *b;
+                count += usize::from(*g > 0 && (n[0] + n[1] + n[2] + b).is_finite());
+            }
+            let mut columns = [[0.0; RUN]; ALL];
+            for i in 0..RUN {
+                let there = |number: f32| if i < count { f64::from(number) } else { 0.0 };
+                columns[0][i] = there(1.0);
+                let terms = terms([numbers[0][i], numbers[1][i], numbers[2][i]].map(there));
+                columns[1..=TERMS].iter_mut().zip(terms).for_each(|(column, t)| column[i] = t);
+                columns[ALL - 1][i] = there(numbers[3][i]);
+            }
+            let filled = count.div_ceil(LANES);
+            for i in 0..ALL {
+                for j in i..ALL {
+                    let mut lanes = [0.0; LANES];
+                    let lists = columns[i].as_chunks::<LANES>().0.iter();
+                    for (x, y) in lists.zip(columns[j].as_chunks::<LANES>().0).take(filled) {
+                        for (sum, (x, y)) in lanes.iter_mut().zip(x.iter().zip(y)) {
+                            *sum += x * y;
+                        }
+                    }
+                    sums[i][j] = lanes.iter().sum();
+                }
+            }
+        },
+    );
+    sums
 }
 
-/// Sums of the products of (1, terms, brightness); only those on and above the diagonal
-/// are kept.
-struct Moments {
-    some: Pixels,
-    products: [[[f64; LANES]; ALL]; ALL],
+/// The sums of a picture, kept while some of its pixels change.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Kept {
+    normals: Vec<[f32; 3]>,
+    /// By run, and by group of runs.
+    runs: Vec<Products>,
+    sums: Vec<Products>,
+    /// Runs with pixels that have changed since.
+    changed: Vec<bool>,
 }
 
-impl Moments {
-    #[inline(always)]
-    fn push(&mut self, [x, y, z]: [f32; 3], brightness: f32) {
-        let Pixels { numbers, count } = &mut self.some;
-        let i = *count & (SOME - 1);
-        numbers.iter_mut().zip([x, y, z, brightness]).for_each(|(list, x)| list[i] = x);
-        *count = i + 1;
-        if *count == SOME {
-            self.add();
+impl Kept {
+    /// Starts with a picture of `pixels` pixels; normals missing at the end are not finite.
+    pub fn begin(&mut self, normals: &[[f32; 3]], pixels: usize) {
+        self.normals.clear();
+        self.normals.extend_from_slice(&normals[..normals.len().min(pixels)]);
+        self.normals.resize(pixels, [f32::NAN; 3]);
+        let runs = pixels.div_ceil(RUN);
+        self.runs.clear();
+        self.runs.resize(runs, NONE);
+        self.sums.clear();
+        self.sums.resize(runs.div_ceil(RUNS), NONE);
+        self.changed.clear();
+        self.changed.resize(runs, true);
+    }
+
+    /// A pixel has another normal, or another group.
+    pub fn change(&mut self, pixel: usize, normal: [f32; 3]) {
+        if let (Some(own), Some(changed)) =
+            (self.normals.get_mut(pixel), self.changed.get_mut(pixel / RUN))
+        {
+            (*own, *changed) = (normal, true);
         }
     }
 
-    /// Adds the products of the buffered pixels; unused positions count as 0.
-    #[inline(always)]
-    fn add(&mut self) {
-        let Moments { some: Pixels { numbers: [x, y, z, brightness], count }, products } = self;
-        let mut columns = [[0.0; SOME]; ALL];
-        for i in 0..SOME {
-            columns[0][i] = if i < *count { 1.0 } else { 0.0 };
-            let there = |number: f32| if i < *count { f64::from(number) } else { 0.0 };
-            let terms = terms([x[i], y[i], z[i]].map(there));
-            columns[1..=TERMS].iter_mut().zip(terms).for_each(|(column, t)| column[i] = t);
-            columns[ALL - 1][i] = there(brightness[i]);
-        }
-        for (i, row) in products.iter_mut().enumerate() {
-            for (j, sums) in row.iter_mut().enumerate().skip(i) {
-                let lists =
-                    columns[i].as_chunks::<LANES>().0.iter().zip(columns[j].as_chunks::<LANES>().0);
-                for (x, y) in lists {
-                    for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
-                        *sum += x * y;
-                    }
+    /// As [`log_ratio`], bit for bit.
+    pub fn log_ratio(&mut self, groups: &[u8], brightness: &[f32]) -> f64 {
+        let Kept { normals, runs, sums, changed } = self;
+        let pixels = groups.chunks(RUN).zip(normals.chunks(RUN)).zip(brightness.chunks(RUN));
+        let mut pixels =
+            pixels.map(|((groups, normals), brightness)| (groups, normals, brightness));
+        let of_runs = runs.chunks_mut(RUNS).zip(changed.chunks_mut(RUNS));
+        for ((runs, changed), sum) in of_runs.zip(sums.iter_mut()) {
+            let again = changed.contains(&true);
+            for (run, changed) in runs.iter_mut().zip(changed) {
+                let Some((groups, normals, brightness)) = pixels.next() else { break };
+                if std::mem::take(changed) {
+                    *run = if any(groups) { products(groups, normals, brightness) } else { NONE };
                 }
             }
+            if again {
+                *sum = NONE;
+                runs.iter().for_each(|run| add(sum, run));
+            }
         }
-        *count = 0;
+        let mut all = NONE;
+        sums.iter().for_each(|sum| add(&mut all, sum));
+        from_products(&all)
     }
 }
 
