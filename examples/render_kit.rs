@@ -181,8 +181,7 @@ fn ours(
     case.measure("pcadlang", "likelihood_newmesh", "", |i| {
         let positions = shapes[i % shapes.len()].clone();
         let normals = normals(&positions, &mesh.topology.triangles);
-        let solid =
-            Solid::new(Arc::new(Mesh::of(positions, normals, Arc::clone(&mesh.topology))));
+        let solid = Solid::new(Arc::new(Mesh::of(positions, normals, Arc::clone(&mesh.topology))));
         likelihood(&placed(&solid, &poses[i % poses.len()]));
     });
     Ok(())

@@ -88,8 +88,8 @@ impl Moments {
 /// the forces do not vary, or have no variance, the states alone count.
 fn inverse_masses([states, forces]: &[Moments; 2]) -> Option<Vec<f64>> {
     let one = |(y, g): (f64, f64)| {
-        let mass = (y / g).sqrt();
-        if mass.is_finite() && mass > 0.0 { mass } else { y }.clamp(1e-20, 1e20)
+        let mass = y.sqrt() / g.sqrt();
+        if mass.is_finite() && mass > 0.0 { mass } else { y.max(f64::MIN_POSITIVE) }
     };
     Some(states.variances()?.zip(forces.variances()?).map(one).collect())
 }

@@ -1,3 +1,6 @@
+//! Trees of faces against drawing every face: pieces, depth ranges, contours and depths, bit for
+//! bit.
+
 use super::hiding::Hiding;
 use super::pieces::{Found, extract_posed};
 use super::*;
