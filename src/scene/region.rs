@@ -153,6 +153,9 @@ impl RegionOf {
     }
 }
 
+/// What counts a picture's groups and normals.
+type Count<'a> = &'a mut dyn FnMut(&[u8], &[[f32; 3]]);
+
 impl Likelihood for RegionOf {
     fn name(&self) -> &'static str {
         "scene.region"
@@ -169,7 +172,7 @@ impl Likelihood for RegionOf {
             let FrameChange { from, to, pixels, part, normal } = change;
             self.fill_parts(part, groups);
             let change = GroupChange { from, to, pixels, groups, normals: normal };
-            let whole = |count: &mut dyn FnMut(&[u8], &[[f32; 3]])| {
+            let whole = |count: Count| {
                 let (frame, mut groups) = (self.frame(), Vec::new());
                 self.fill(&frame, &mut groups);
                 count(&groups, &frame.normal);

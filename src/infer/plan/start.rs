@@ -13,9 +13,12 @@ use crate::lang::value::Value;
 use crate::trace::{Draws, Trace};
 use std::sync::{Arc, Mutex, PoisonError};
 
+/// How a chain starts, and the kernel that proposes its states, if any.
+type StartOf = (Start, Option<ProgramKernel>);
+
 /// How chains start, which is the same for all of them: worked out by the first.
 #[derive(Debug, Default)]
-pub(crate) struct SharedStart(Mutex<Option<(Start, Option<ProgramKernel>)>>);
+pub(crate) struct SharedStart(Mutex<Option<StartOf>>);
 
 impl SharedStart {
     /// Works it out. A failure is ignored: the chains will report it.
@@ -26,8 +29,8 @@ impl SharedStart {
     /// Returns it, from the first call of `make` that succeeds.
     pub(super) fn get(
         &self,
-        make: impl FnOnce() -> Result<(Start, Option<ProgramKernel>), ChainError>,
-    ) -> Result<(Start, Option<ProgramKernel>), ChainError> {
+        make: impl FnOnce() -> Result<StartOf, ChainError>,
+    ) -> Result<StartOf, ChainError> {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         match &*known {
             Some(start) => Ok(start.clone()),
@@ -42,7 +45,7 @@ pub(super) fn start_of(
     code: &Arc<Code>,
     plan: &Plan,
     options: &RunOptions,
-) -> Result<(Start, Option<ProgramKernel>), ChainError> {
+) -> Result<StartOf, ChainError> {
     let init = plan.steps.iter().find_map(|s| match &s.kind {
         StepKind::Init(start) => Some(start),
         _ => None,

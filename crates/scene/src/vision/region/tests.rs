@@ -4,6 +4,9 @@
 use super::*;
 use pcadlang_numerics::rng::{Purpose, StreamKey};
 
+/// What counts a picture's groups and normals.
+type Count<'a> = &'a mut dyn FnMut(&[u8], &[[f32; 3]]);
+
 const GLOBAL: RegionOptions =
     RegionOptions { power: 1.0, tiles: 0, tile_power: 0.0, colours: 4, prior: 0.5, shading: 0.0 };
 
@@ -309,7 +312,7 @@ fn a_tally_follows_changes_bit_for_bit() {
             };
             let plain = region.log_likelihood(&groups, &normals);
             for _ in 0..2 {
-                let whole = |count: &mut dyn FnMut(&[u8], &[[f32; 3]])| {
+                let whole = |count: Count| {
                     asked += 1;
                     count(&groups, &normals);
                 };
