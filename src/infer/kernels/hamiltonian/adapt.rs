@@ -1,8 +1,6 @@
 //! Warm-up of Hamiltonian kernels: dual averaging of the step size (Hoffman & Gelman
-//! 2014, section 3.2), and a diagonal metric from windows that double in length, as in
-//! Stan. The metric is the diagonal one of Seyboldt, Carlson & Carpenter 2026, which
-//! minimises the Fisher divergence (nutpie has it, too): the geometric
-//! mean of the variances of the states and the inverse variances of the forces there.
+//! 2014, section 3.2), and a diagonal metric from the variances over windows that double
+//! in length, as in Stan.
 
 use super::point::Point;
 use super::system::System;
@@ -38,7 +36,7 @@ pub(super) struct Adaptation {
     /// What the metric belongs to: addresses and their numbers of coordinates.
     signature: Vec<(u64, usize)>,
     pub inverse_mass: Vec<f64>,
-    /// By address, the inverse masses from the last windows. Choices that disappear and
+    /// By address, the variances from the last windows. Choices that disappear and
     /// reappear get theirs again, so that after warm-up the metric is a function of the
     /// set of choices.
     learnt: BTreeMap<u64, Vec<f64>>,
@@ -52,9 +50,9 @@ pub(super) struct Adaptation {
     seen: u32,
     window_end: u32,
     window: u32,
-    /// The states of this window and the forces there, by address; choices that disappear
-    /// and reappear continue to be counted.
-    states: BTreeMap<u64, [Moments; 2]>,
+    /// The states of this window, by address; choices that disappear and reappear
+    /// continue to be counted.
+    states: BTreeMap<u64, Moments>,
 }
 
 /// Means and sums of squares of a choice's coordinates (Welford 1962).
@@ -78,20 +76,13 @@ impl Moments {
         }
     }
 
-    /// The variances, if there are enough states.
-    fn variances(&self) -> Option<impl Iterator<Item = f64>> {
-        (self.count >= 3.0).then(|| self.square.iter().map(|s| s / (self.count - 1.0)))
+    /// The variances, shrunk towards a small value if there are few states, as in Stan;
+    /// `None` for fewer than two states.
+    fn variances(&self) -> Option<Vec<f64>> {
+        let n = self.count;
+        let variance = |s: &f64| (n / (n + 5.0)) * (s / (n - 1.0)) + 1e-3 * 5.0 / (n + 5.0);
+        (n >= 2.0).then(|| self.square.iter().map(variance).collect())
     }
-}
-
-/// The inverse masses for these states and the forces there; `None` for too few states. Where
-/// the forces do not vary, or have no variance, the states alone count.
-fn inverse_masses([states, forces]: &[Moments; 2]) -> Option<Vec<f64>> {
-    let one = |(y, g): (f64, f64)| {
-        let mass = y.sqrt() / g.sqrt();
-        if mass.is_finite() && mass > 0.0 { mass } else { y.max(f64::MIN_POSITIVE) }
-    };
-    Some(states.variances()?.zip(forces.variances()?).map(one).collect())
 }
 
 impl Adaptation {
@@ -121,7 +112,7 @@ impl Adaptation {
     pub fn take_up(&mut self, read: Adaptation) -> Result<(), StateError> {
         let n = read.inverse_mass.len();
         let sizes = read.signature.iter().try_fold(0usize, |sum, s| sum.checked_add(s.1));
-        let whole = |ms: &[Moments; 2]| ms.iter().all(|m| m.mean.len() == m.square.len());
+        let whole = |m: &Moments| m.mean.len() == m.square.len();
         holds(sizes == Some(n) && read.states.values().all(whole), "a step size and metric")?;
         *self = Adaptation { target: self.target, fixed: self.fixed, ..read };
         Ok(())
@@ -157,7 +148,7 @@ impl Adaptation {
     }
 
     /// Adapts to a transition: its mean acceptance probability and its end point.
-    pub fn learn(&mut self, acceptance: f64, end: &Point) {
+    pub fn learn(&mut self, acceptance: f64, y: &[f64]) {
         self.rounds += 1.0;
         let weight = 1.0 / (self.rounds + T0);
         let off = self.target - if acceptance.is_nan() { 0.0 } else { acceptance.min(1.0) };
@@ -174,13 +165,11 @@ impl Adaptation {
         };
         self.seen = self.seen.saturating_add(1);
         if self.seen > BURN {
-            let mut from = 0;
+            let mut rest = y;
             for (hash, n) in &self.signature {
-                let own = from..from + n;
-                let lists = [&end.y, &end.gradient].map(|list| list.get(own.clone()));
-                let moments = self.states.entry(*hash).or_default();
-                moments.iter_mut().zip(lists).for_each(|(m, list)| m.add(list.unwrap_or(&[])));
-                from = own.end;
+                let (own, others) = rest.split_at((*n).min(rest.len()));
+                self.states.entry(*hash).or_default().add(own);
+                rest = others;
             }
         }
         if self.seen == self.window_end {
@@ -195,16 +184,16 @@ impl Adaptation {
         }
     }
 
-    /// Ends a window: it gives the metric of the choices that it saw often enough.
+    /// Ends a window: its variances become the metric of the choices that it saw at least
+    /// twice.
     fn close(&mut self) {
         let seen = std::mem::take(&mut self.states);
-        self.learnt
-            .extend(seen.into_iter().filter_map(|(hash, m)| Some((hash, inverse_masses(&m)?))));
+        self.learnt.extend(seen.into_iter().filter_map(|(hash, m)| Some((hash, m.variances()?))));
         self.inverse_mass = self.metric();
     }
 
-    /// The inverse masses of the present choices: those of previous windows, or 1 for
-    /// choices without.
+    /// The inverse masses of the present choices: the variances of previous windows, or 1
+    /// for those without.
     fn metric(&self) -> Vec<f64> {
         let known =
             |(hash, n): &(u64, usize)| self.learnt.get(hash).filter(|m| m.len() == *n).cloned();

@@ -1,3 +1,5 @@
+//! Clusters against the faces that they are made from: bounds, and the order of everything.
+
 use super::*;
 use crate::geom::{Mesh, Solid};
 
