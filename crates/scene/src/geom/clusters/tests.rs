@@ -1,4 +1,4 @@
-//! Clusters against the faces that they are made from: bounds, and the order of everything.
+//! Clusters against the faces that they are made from.
 
 use super::*;
 use crate::geom::{Mesh, Solid};
