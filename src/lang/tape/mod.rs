@@ -298,9 +298,15 @@ impl Tape {
     }
 
     /// Sets the power of the likelihood within sums over choices: there, scores cannot be
-    /// told apart afterwards. The sum is the log prior of [`Tape::sums`], tempered.
-    pub fn set_power(&mut self, power: f64) {
+    /// told apart afterwards. The sum is the log prior of [`Tape::sums`], tempered. Returns
+    /// whether the last run was for another power.
+    pub fn set_power(&mut self, power: f64) -> bool {
+        let changes = self.power.0 != power && !self.summed.is_empty();
+        if changes {
+            self.last.clear();
+        }
         self.power = Power(power);
+        changes
     }
 
     /// Computes the derivatives, with respect to the coordinates `y` at which it was last

@@ -89,7 +89,9 @@ impl Recording {
     /// Sets the power of the likelihood for sums over choices; densities are then
     /// tempered within these sums, and not outside.
     pub fn set_power(&mut self, power: f64) {
-        self.tape.set_power(power);
+        if self.tape.set_power(power) {
+            self.here = None;
+        }
     }
 
     /// The number of scores in a sum over the choices, and in a sweep that updates one of
