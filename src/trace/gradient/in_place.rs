@@ -35,7 +35,6 @@ pub(in crate::trace) struct InPlace {
 /// What a node keeps besides its value, and where that is on a tape.
 #[derive(Clone, Debug)]
 pub(in crate::trace) enum Besides {
-    Nothing,
     /// The last evaluation of an incremental function.
     Evaluation(Scored),
     /// The white noise that a choice is stored as.
@@ -51,7 +50,7 @@ impl InPlace {
         n: NodeId,
         given: Given,
         form: Form,
-        besides: Besides,
+        besides: Option<&Besides>,
         is_fixed: impl Fn(FrameId, Operand) -> bool,
     ) -> bool {
         let node = &graph.nodes[n as usize];
@@ -65,11 +64,11 @@ impl InPlace {
                 Op::Map { over, .. } | Op::Fold { over, .. } => is_fixed(node.frame, *over),
                 _ => false,
             },
-            Some(Side::Kept(_)) => matches!(besides, Besides::Evaluation(_)),
+            Some(Side::Kept(_)) => matches!(besides, Some(Besides::Evaluation(_))),
             Some(Side::Table(_) | Side::Memo(_)) => false,
         };
-        if fits && !matches!(besides, Besides::Nothing) {
-            self.besides.push((given.clone(), n, besides));
+        if let Some(besides) = besides.filter(|_| fits) {
+            self.besides.push((given.clone(), n, besides.clone()));
         }
         if fits && !form.is_fixed() {
             self.values.push((given, n, form));
@@ -89,7 +88,6 @@ impl InPlace {
         self.besides.iter_mut().for_each(|(_, _, besides)| match besides {
             Besides::Evaluation(call) => *call = tape.place_of_score(call),
             Besides::Noise(form) => *form = tape.place_of(form),
-            Besides::Nothing => {}
         });
         self
     }

@@ -117,8 +117,7 @@ impl Graph {
             scores,
             moving: Vec::new(),
             scored: Vec::new(),
-            evaluations: FxHashMap::default(),
-            noise: FxHashMap::default(),
+            besides: FxHashMap::default(),
         }
     }
 }
@@ -159,10 +158,8 @@ pub(in crate::trace) struct Recorder<'a> {
     moving: Vec<NodeId>,
     /// Where the scores are that have been recorded.
     scored: Vec<(NodeId, Scored)>,
-    /// Where the evaluations of incremental functions are, and the noise of choices that
-    /// are stored as such.
-    evaluations: FxHashMap<NodeId, Scored>,
-    noise: FxHashMap<NodeId, Form>,
+    /// What else of a node moves than its value.
+    besides: FxHashMap<NodeId, Besides>,
 }
 
 impl Recorder<'_> {
@@ -227,20 +224,11 @@ impl Recorder<'_> {
             let Some(given) = given(*n) else { return false };
             let of = (self.view.graph, self.view.code);
             !known.insert((*n, given.clone()))
-                || in_place.add_value(of, *n, given, self.form(*n), self.besides(*n), is_fixed)
+                || in_place.add_value(of, *n, given, self.form(*n), self.besides.get(n), is_fixed)
         });
         self.moving.clear();
         self.recorded.known = known;
         self.recorded.in_place = fits.then_some(in_place);
-    }
-
-    /// What else of a node moves than its value.
-    fn besides(&self, n: NodeId) -> Besides {
-        match (self.evaluations.get(&n), self.noise.get(&n)) {
-            (Some(call), _) => Besides::Evaluation(call.clone()),
-            (_, Some(noise)) => Besides::Noise(noise.clone()),
-            _ => Besides::Nothing,
-        }
     }
 
     /// Does the same with the scores recorded since the last call, which are these for
@@ -449,7 +437,7 @@ impl Recorder<'_> {
         if let Some(before) = self.view.graph.kept(n)
             && let Some(call) = self.recorded.tape.start_from(before)
         {
-            self.evaluations.insert(n, call);
+            self.besides.insert(n, Besides::Evaluation(call));
         }
     }
 
@@ -515,7 +503,7 @@ impl Recorder<'_> {
         };
         let value = self.recorded.tape.coloured(made, &dist, &x)?;
         if self.recorded.placed.contains_key(&n) {
-            self.noise.insert(n, x);
+            self.besides.insert(n, Besides::Noise(x));
         }
         Some(value)
     }
