@@ -73,14 +73,7 @@ fn round(c: &mut Criterion) {
             _ => Solid::lathe(&profile, sides, wall, caps).expect("a lathe"),
         };
         let seen = Contours::of(&solid(0).placed(pose(&mut 0.0)), &camera);
-        let map = ContourMap {
-            x: seen.x.clone(),
-            y: seen.y.clone(),
-            tx: seen.tx.clone(),
-            ty: seen.ty.clone(),
-            strength: vec![1.0; seen.len()],
-            ..ContourMap::new(128, 128)
-        };
+        let map = ContourMap::of(&seen.slice());
         let chamfer = Chamfer::prepare(&map, 128, 128, &ChamferOptions::default());
         let (chamfer, mut scratch) = (chamfer.expect("contours"), Scratch::default());
         for (what, sides) in [("round", 0), ("mesh of 24 sides", 24)] {

@@ -75,8 +75,7 @@ fn contours(set: &[(&str, String)]) -> Result<ContourMap, Box<dyn Error>> {
     let draws = Draws { key: StreamKey::new(0, 0, Purpose::PREDICT), step: 0, substream: 0 };
     let view = trace.global("view", draws).ok_or("no view")?.map_err(|e| model.run_error(*e))?;
     let c = view.downcast::<ViewValue>().ok_or("no view")?.0.contours(SEEN);
-    let (x, y, tx, ty) = (c.x.clone(), c.y.clone(), c.tx.clone(), c.ty.clone());
-    Ok(ContourMap { strength: vec![1.0; x.len()], x, y, tx, ty, ..ContourMap::new(SEEN, SEEN) })
+    Ok(ContourMap::of(&c.slice()))
 }
 
 /// Runs the chains. Returns the acceptance rate, seconds per step, and effective draws

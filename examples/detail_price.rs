@@ -104,9 +104,7 @@ fn rho(chamfer: &Chamfer, view: &View, size: u32) -> f64 {
 }
 
 fn map(view: &View, size: u32) -> ContourMap {
-    let c = view.contours(size);
-    let (x, y, tx, ty) = (c.x.clone(), c.y.clone(), c.tx.clone(), c.ty.clone());
-    ContourMap { x, y, tx, ty, strength: vec![1.0; c.len()], ..ContourMap::new(size, size) }
+    ContourMap::of(&view.contours(size).slice())
 }
 
 fn quantile(values: &[f64], share: f64) -> f64 {

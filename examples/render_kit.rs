@@ -138,14 +138,7 @@ fn ours(
         drop(std::hint::black_box(Contours::of(&at(i), &camera)))
     });
     let seen = Contours::of(&placed(solid, last), &camera);
-    let observed = ContourMap {
-        x: seen.x.clone(),
-        y: seen.y.clone(),
-        tx: seen.tx.clone(),
-        ty: seen.ty.clone(),
-        strength: vec![1.0; seen.len()],
-        ..ContourMap::new(case.size, case.size)
-    };
+    let observed = ContourMap::of(&seen.slice());
     let chamfer = Chamfer::prepare(&observed, case.size, case.size, &ChamferOptions::default())?;
     let mut scratch = Scratch::default();
     let mut likelihood = |solid: &Solid| {

@@ -68,15 +68,7 @@ fn draw(model: &Model, seed: u64) -> Result<Option<(Trace, ContourMap)>> {
         let c = view.0.contours(SIZE);
         let inside = |v: &[f32]| v.iter().all(|x| (2.0..SIZE as f32 - 2.0).contains(x));
         if c.total_length() > 60.0 && inside(&c.x) && inside(&c.y) {
-            let (x, y, tx, ty) = (c.x.clone(), c.y.clone(), c.tx.clone(), c.ty.clone());
-            let map = ContourMap {
-                strength: vec![1.0; x.len()],
-                x,
-                y,
-                tx,
-                ty,
-                ..ContourMap::new(SIZE, SIZE)
-            };
+            let map = ContourMap::of(&c.slice());
             return Ok(Some((trace, map)));
         }
     }

@@ -57,14 +57,7 @@ pub fn draw(blank: &Model, seed: u64) -> Result<(Trace, ContourMap), pcadlang::E
         if c.length.iter().sum::<f32>() < 100.0 || !inside(&c.x) || !inside(&c.y) {
             continue;
         }
-        let map = ContourMap {
-            x: c.x.clone(),
-            y: c.y.clone(),
-            tx: c.tx.clone(),
-            ty: c.ty.clone(),
-            strength: vec![1.0; c.x.len()],
-            ..ContourMap::new(SIZE, SIZE)
-        };
+        let map = ContourMap::of(&c.slice());
         return Ok((trace, map));
     }
     unreachable!("attempts do not end")

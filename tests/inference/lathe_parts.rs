@@ -34,8 +34,7 @@ fn model(text: &str, map: ContourMap) -> Model {
 fn shown(trace: &mut Trace) -> ContourMap {
     let view = trace.global("view", Draws::default()).unwrap().unwrap();
     let c = view.downcast::<ViewValue>().unwrap().0.contours(SIZE);
-    let [x, y, tx, ty] = [&c.x, &c.y, &c.tx, &c.ty].map(Clone::clone);
-    ContourMap { x, y, tx, ty, strength: vec![1.0; c.len()], ..ContourMap::new(SIZE, SIZE) }
+    ContourMap::of(&c.slice())
 }
 
 fn set(trace: &mut Trace, values: &[(&str, Value)]) {

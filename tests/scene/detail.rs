@@ -25,9 +25,7 @@ fn contours(solid: &Solid, detail: f64) -> Arc<Contours> {
 
 /// Returns a function for the mean distance from these contours, in pixels.
 fn to(c: &Contours) -> impl Fn(&Contours) -> f64 {
-    let (x, y, tx, ty) = (c.x.clone(), c.y.clone(), c.tx.clone(), c.ty.clone());
-    let map =
-        ContourMap { x, y, tx, ty, strength: vec![1.0; c.len()], ..ContourMap::new(SIZE, SIZE) };
+    let map = ContourMap::of(&c.slice());
     let chamfer = Chamfer::prepare(&map, SIZE, SIZE, &ChamferOptions::default()).unwrap();
     let pixels = f64::from(SIZE) * 2f64.sqrt() / 100.0;
     move |c| chamfer.distance(&c.slice()) * pixels

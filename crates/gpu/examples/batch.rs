@@ -15,7 +15,7 @@ use pcadlang_gpu::Gpu;
 use pcadlang_numerics::platform::threads::Pool;
 use pcadlang_scene::geom::{Caps, Solid};
 use pcadlang_scene::render::{BatchRenderer, ContourBatch, Contours, Cores, Scene};
-use pcadlang_scene::vision::{Chamfer, ChamferOptions};
+use pcadlang_scene::vision::{Chamfer, ChamferOptions, ContourMap};
 use scenes::Spread;
 use std::error::Error;
 use std::time::{Duration, Instant};
@@ -119,7 +119,7 @@ fn measure(
 /// What the first scene shows, as a picture's contours.
 fn observed(scene: &Scene) -> Result<Chamfer, Box<dyn Error>> {
     let seen = Contours::of(&scene.solid, &scene.camera);
-    let map = scenes::observed(&seen.slice());
+    let map = ContourMap::of(&seen.slice());
     Ok(Chamfer::prepare(&map, seen.width, seen.height, &ChamferOptions::default())?)
 }
 

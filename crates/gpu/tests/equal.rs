@@ -7,7 +7,7 @@ use glam::DVec3;
 use pcadlang_gpu::Gpu;
 use pcadlang_scene::geom::{Affine, Caps, Solid, cuboid};
 use pcadlang_scene::render::{BatchRenderer, Camera, ContourBatch, Cores, Projection, Scene};
-use pcadlang_scene::vision::{Chamfer, ChamferOptions};
+use pcadlang_scene::vision::{Chamfer, ChamferOptions, ContourMap};
 use scenes::{Difference, Spread, compare};
 use std::error::Error;
 use std::sync::Arc;
@@ -148,7 +148,7 @@ fn scores_are_those_of_the_contours() -> Tested {
     scenes[5].solid =
         scenes[5].solid.placed(Affine::new(DVec3::new(0.0, 0.0, 50.0), DVec3::ZERO, DVec3::ONE));
     let contours = gpu.contours(&scenes);
-    let map = scenes::observed(&contours.scene(0));
+    let map = ContourMap::of(&contours.scene(0));
     let options = [
         ChamferOptions::default(),
         ChamferOptions { truncate: Some(2.0), oriented: Some(3.0), ..ChamferOptions::default() },
@@ -184,7 +184,7 @@ fn batches_follow_each_other_and_find_room() -> Tested {
     let all = gpu.contours(&scenes);
     assert_eq!(all.scene(2106), all.scene(0));
     assert_eq!(gpu.contours(&bodies).scene(5), all.scene(2105));
-    let map = scenes::observed(&all.scene(0));
+    let map = ContourMap::of(&all.scene(0));
     let chamfer = Chamfer::prepare(&map, 32, 32, &ChamferOptions::default())?;
     let scores = gpu.log_likelihoods(&scenes[..2100], &chamfer);
     let same = (0..2100).filter(|&i| {

@@ -58,14 +58,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let camera =
         Camera { eye: DVec3::ZERO, right, up, forward, width: size, height: size, projection };
     let seen = Contours::of(&solid.placed(*poses.last().ok_or("no poses")?), &camera);
-    let observed = ContourMap {
-        x: seen.x.clone(),
-        y: seen.y.clone(),
-        tx: seen.tx.clone(),
-        ty: seen.ty.clone(),
-        strength: vec![1.0; seen.len()],
-        ..ContourMap::new(size, size)
-    };
+    let observed = ContourMap::of(&seen.slice());
     let chamfer = Chamfer::prepare(&observed, size, size, &ChamferOptions::default())?;
     let mut scratch = Scratch::default();
     let mut pieces = 0;

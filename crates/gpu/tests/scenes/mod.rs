@@ -4,7 +4,6 @@ use glam::DVec3;
 use pcadlang_scene::geom::armature::{Armature, JointPose, Rules, rig_from_json};
 use pcadlang_scene::geom::{Affine, Caps, Profile, Solid, obj};
 use pcadlang_scene::render::{Camera, ContourBatch, ContourSlice, Scene};
-use pcadlang_scene::vision::ContourMap;
 use std::error::Error;
 use std::sync::Arc;
 
@@ -139,16 +138,4 @@ fn nearest([x, y]: [f32; 2], [tx, ty]: [f32; 2], to: &ContourSlice<'_>) -> f32 {
     let all = (0..to.len()).map(|k| (distance(k), k));
     let near = all.filter(|(d, k)| *d < 1.0 && along(*k)).map(|(d, _)| d);
     near.fold(f32::INFINITY, f32::min).sqrt()
-}
-
-/// Drawn contours as those seen in a picture.
-pub fn observed(drawn: &ContourSlice<'_>) -> ContourMap {
-    ContourMap {
-        x: drawn.x.to_vec(),
-        y: drawn.y.to_vec(),
-        tx: drawn.tx.to_vec(),
-        ty: drawn.ty.to_vec(),
-        strength: vec![1.0; drawn.len()],
-        ..ContourMap::new(drawn.width, drawn.height)
-    }
 }

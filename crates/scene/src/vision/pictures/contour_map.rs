@@ -1,6 +1,7 @@
 //! Contours of a picture as points with tangents and strengths: the output of detectors
 //! and the input of comparators.
 
+use crate::contours::ContourSlice;
 use crate::vision::detect::gradient::{principal, smoothed};
 use crate::vision::detect::nms::{EdgePoint, ridge_offset};
 use crate::vision::detect::thin::thinned;
@@ -31,6 +32,19 @@ impl ContourMap {
     /// A map without points.
     pub fn new(width: u32, height: u32) -> Self {
         ContourMap { width, height, ..ContourMap::default() }
+    }
+
+    /// Drawn contours as if they were seen in a picture of their size, all equally strong.
+    pub fn of(drawn: &ContourSlice<'_>) -> Self {
+        ContourMap {
+            width: drawn.width,
+            height: drawn.height,
+            x: drawn.x.to_vec(),
+            y: drawn.y.to_vec(),
+            tx: drawn.tx.to_vec(),
+            ty: drawn.ty.to_vec(),
+            strength: vec![1.0; drawn.len()],
+        }
     }
 
     /// Number of points.
