@@ -1,6 +1,9 @@
 //! Parallel maps, which run sequentially if there are no threads. Invariant: results do
 //! not depend on the number of threads.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
 /// A pool of threads. It has none in a build without the feature `threads`, or if they
 /// cannot be created.
 pub struct Pool {
@@ -73,9 +76,28 @@ pub fn side_by_side<T: Send>(parts: impl IntoIterator<Item = T>, work: impl Fn(u
     parts.into_iter().enumerate().for_each(|(i, part)| work(i, part));
 }
 
+/// Applies `one` to each item on threads of its own, one per core; results are in order.
+/// Like [`side_by_side`], it may be called by one who holds a lock.
+pub fn map_side_by_side<I: Sync, T: Send>(items: &[I], one: impl Fn(&I) -> T + Sync) -> Vec<T> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let next = AtomicUsize::new(0);
+    let done = Mutex::new(Vec::with_capacity(items.len()));
+    side_by_side(0..cores.min(items.len()), |_, _| {
+        loop {
+            let i = next.fetch_add(1, Ordering::Relaxed);
+            let Some(item) = items.get(i) else { break };
+            let result = one(item);
+            done.lock().unwrap_or_else(PoisonError::into_inner).push((i, result));
+        }
+    });
+    let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    done.sort_by_key(|(i, _)| *i);
+    done.into_iter().map(|(_, result)| result).collect()
+}
+
 #[cfg(test)]
 mod tests {
-    use super::in_parallel;
+    use super::{in_parallel, map_side_by_side};
 
     #[test]
     fn results_are_in_order_on_any_number_of_threads() {
@@ -83,5 +105,8 @@ mod tests {
         for threads in [0, 1, 2, 7] {
             assert_eq!(in_parallel(threads, (0..1000u64).collect(), |i| i * i), expected);
         }
+        let items: Vec<u64> = (0..1000).collect();
+        assert_eq!(map_side_by_side(&items, |i| i * i), expected);
+        assert!(map_side_by_side(&[], |i: &u64| i * i).is_empty());
     }
 }

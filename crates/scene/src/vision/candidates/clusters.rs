@@ -1,8 +1,10 @@
 //! Clusters of pixels by k-means from a deterministic start. The clusters' components are
 //! regions, and a codebook assigns every pixel a letter for histograms.
 
-use super::area::{Area, components};
+use super::area::Area;
+use super::components::components;
 use super::picture::Picture;
+use super::pixels::Pixels;
 use pcadlang_numerics::num::simd::vectorised;
 
 /// Number of coordinates of a pixel: L*, a*, b*, the local deviation of L*, and its
@@ -14,7 +16,7 @@ type Point = [f32; COORDINATES];
 const MOST: usize = 12;
 /// Weights of position (along the longer side of the picture, in units of L*) and of the
 /// local deviation.
-const WEIGHTS: [[f32; 2]; 4] = [[0.0, 0.0], [0.0, 1.0], [40.0, 0.5], [80.0, 1.0]];
+pub const WEIGHTS: [[f32; 2]; 4] = [[0.0, 0.0], [0.0, 1.0], [40.0, 0.5], [80.0, 1.0]];
 /// The maximum number of letters of a codebook.
 pub const LETTERS: usize = 48;
 /// Approximate maximum number of pixels that clusters are fitted to.
@@ -22,7 +24,7 @@ const FITTED: usize = 1 << 12;
 /// Rounds of k-means after each new centre.
 const ROUNDS: usize = 4;
 /// Number of points that are compared with a centre at a time.
-const BLOCK: usize = 32;
+const BLOCK: usize = 8;
 
 /// Points as a list per coordinate, padded with zeros to whole blocks.
 struct Points {
@@ -46,30 +48,37 @@ impl Points {
 
     /// Returns the nearest centre of every point, the first one among equals.
     fn nearest(&self, centres: &[Point]) -> Vec<u32> {
+        let lists = self.lists.each_ref().map(|list| list.as_chunks::<BLOCK>().0);
         let mut labels = vec![0u32; self.lists[0].len()];
         vectorised(
             #[inline(always)]
             || {
                 for (block, labels) in labels.as_chunks_mut::<BLOCK>().0.iter_mut().enumerate() {
-                    let lists: [&[f32]; COORDINATES] =
-                        std::array::from_fn(|c| &self.lists[c][block * BLOCK..][..BLOCK]);
-                    let mut least = [f32::INFINITY; BLOCK];
-                    for (k, centre) in centres.iter().enumerate() {
-                        for i in 0..BLOCK {
-                            let mut d = 0.0;
-                            for c in 0..COORDINATES {
-                                d += (lists[c][i] - centre[c]) * (lists[c][i] - centre[c]);
-                            }
-                            labels[i] = if d < least[i] { k as u32 } else { labels[i] };
-                            least[i] = least[i].min(d);
-                        }
-                    }
+                    let lists = lists.map(|list| list[block]);
+                    *labels = nearest(&lists, centres);
                 }
             },
         );
         labels.truncate(self.count);
         labels
     }
+}
+
+/// Returns the nearest centre of each point of a block.
+#[inline(always)]
+fn nearest(lists: &[[f32; BLOCK]; COORDINATES], centres: &[Point]) -> [u32; BLOCK] {
+    let (mut labels, mut least) = ([0u32; BLOCK], [f32::INFINITY; BLOCK]);
+    for (k, centre) in centres.iter().enumerate() {
+        for i in 0..BLOCK {
+            let mut d = 0.0;
+            for c in 0..COORDINATES {
+                d += (lists[c][i] - centre[c]) * (lists[c][i] - centre[c]);
+            }
+            labels[i] = if d < least[i] { k as u32 } else { labels[i] };
+            least[i] = if d < least[i] { d } else { least[i] };
+        }
+    }
+    labels
 }
 
 /// Returns the coordinates, scaled by weights, of all pixels and of the pixels on a grid
@@ -135,13 +144,24 @@ impl Means {
         all
     }
 
+    /// Runs some rounds of k-means; stops when nothing changes any more.
+    fn rounds(&mut self, most: usize) {
+        for _ in 0..most {
+            let last = self.round();
+            if self.labels == last {
+                break;
+            }
+        }
+    }
+
     /// Moves centres to the means of their points, and assigns points to their nearest
-    /// centres. A centre without points stays.
-    fn round(&mut self) {
+    /// centres. A centre without points stays. Returns the labels that points had.
+    fn round(&mut self) -> Vec<u32> {
         let all = self.moments();
         let pairs = self.centres.iter_mut().zip(&all).filter(|(_, m)| m.count > 0.0);
         pairs.for_each(|(centre, m)| *centre = m.mean());
-        self.labels = self.points.nearest(&self.centres);
+        let labels = self.points.nearest(&self.centres);
+        std::mem::replace(&mut self.labels, labels)
     }
 
     /// Adds a cluster by splitting one; returns false if all points in it are equal.
@@ -177,21 +197,24 @@ impl Means {
     }
 }
 
-/// Returns the components of clusters that have at least `least` pixels.
-pub fn regions(picture: &Picture, least: usize) -> Vec<Area> {
+/// Returns the components of clusters that have at least `least` pixels, with weights of
+/// position and variation.
+pub fn regions(picture: &Picture, weights: [f32; 2], least: usize) -> Vec<Area> {
     let (w, h) = (picture.width, picture.height);
     let mut out = Vec::new();
-    for weights in WEIGHTS {
-        let (all, some) = points(picture, weights);
-        let mut means = Means::new(some);
-        while means.centres.len() < MOST && means.split() {
-            (0..ROUNDS).for_each(|_| means.round());
-            let labels = all.nearest(&means.centres);
-            let (of, sizes) = components(w, h, |p| labels[p]);
-            for (number, _) in sizes.iter().enumerate().filter(|(_, s)| **s >= least) {
-                out.extend(Area::new(w, h, of.iter().map(|o| *o as usize == number).collect()));
+    let (all, some) = points(picture, weights);
+    let mut means = Means::new(some);
+    while means.centres.len() < MOST && means.split() {
+        means.rounds(ROUNDS);
+        let (of, sizes) = components(w, &all.nearest(&means.centres));
+        let large = |size: &usize| (*size >= least).then(|| Pixels::none(w, h));
+        let mut large: Vec<Option<Pixels>> = sizes.iter().map(large).collect();
+        for (p, number) in of.iter().enumerate() {
+            if let Some(pixels) = &mut large[*number as usize] {
+                pixels.insert(p % w, p / w);
             }
         }
+        out.extend(large.into_iter().flatten().filter_map(Area::of));
     }
     out
 }
@@ -201,6 +224,6 @@ pub fn codebook(picture: &Picture) -> Vec<u8> {
     let (all, some) = points(picture, [0.0, 1.0]);
     let mut means = Means::new(some);
     while means.centres.len() < LETTERS && means.split() {}
-    (0..ROUNDS).for_each(|_| means.round());
+    means.rounds(ROUNDS);
     all.nearest(&means.centres).into_iter().map(|l| l as u8).collect()
 }

@@ -22,7 +22,6 @@ const CLIP: f32 = 3.0;
 /// and the similarity of neighbours.
 pub struct Field {
     width: usize,
-    height: usize,
     pub codewords: Vec<u8>,
     /// Similarity of each pixel to the one on its left, with one extra entry.
     left: Vec<f32>,
@@ -52,28 +51,32 @@ impl Field {
         let mean = all.map(|d| f64::from(*d)).sum::<f64>() / (2 * w * h) as f64;
         let beta = 0.5 / mean.max(1e-3) as f32;
         left.iter_mut().chain(&mut above).for_each(|d| *d = libm::expf(-beta * *d));
-        Field { width: w, height: h, codewords, left, above }
+        Field { width: w, codewords, left, above }
     }
 
     /// Cuts out the object at a seed; `None` if nothing stands out.
     pub fn cut(&self, seed: &Area) -> Option<Area> {
         let by = (0.22 * (seed.count as f64).sqrt()).max(4.0) as usize;
-        let window = seed.dilated(by);
-        let mut mask = seed.on.clone();
+        // Pixels with even and with odd sum of column and row.
+        let mut window = [const { Vec::new() }; 2];
+        for (i, j) in seed.dilated(by).points() {
+            window[(i + j) % 2].push(j * self.width + i);
+        }
+        let mut mask = seed.pixels.bools();
         let mut belief = vec![0.0f32; mask.len()];
         for _ in 0..ESTIMATES {
             let gain = self.gains(&window, &mask)?;
             self.mean_field(&window, &gain, &mask, &mut belief);
             mask.iter_mut().zip(&belief).for_each(|(m, b)| *m = *b > 0.5);
         }
-        Some(largest(self.width, self.height, &mask)?.filled())
+        Some(largest(self.width, &mask)?.filled())
     }
 
     /// Returns for each letter the log ratio of its frequency on the object and beside
     /// it; `None` if either is empty.
-    fn gains(&self, window: &[bool], mask: &[bool]) -> Option<[f32; LETTERS]> {
+    fn gains(&self, window: &[Vec<usize>; 2], mask: &[bool]) -> Option<[f32; LETTERS]> {
         let mut counts = [[0u32; LETTERS]; 2];
-        for (p, _) in window.iter().enumerate().filter(|(_, inside)| **inside) {
+        for &p in window.iter().flatten() {
             counts[usize::from(mask[p])][usize::from(self.codewords[p])] += 1;
         }
         let totals = counts.map(|c| c.iter().sum::<u32>());
@@ -90,28 +93,23 @@ impl Field {
     }
 
     /// Updates the belief of each pixel of the window to be on the object, starting from
-    /// the last mask. Pixels with even and with odd sum of column and row alternate: no
-    /// two neighbours change at once, so the iteration converges.
+    /// the last mask. The two halves of the window alternate: no two neighbours change at
+    /// once, so the iteration converges.
     fn mean_field(
         &self,
-        window: &[bool],
+        window: &[Vec<usize>; 2],
         gain: &[f32; LETTERS],
         mask: &[bool],
         belief: &mut [f32],
     ) {
-        let (w, h) = (self.width, self.height);
+        let (w, n) = (self.width, self.codewords.len());
         belief.iter_mut().zip(mask).for_each(|(b, m)| *b = f32::from(u8::from(*m)));
-        let odd = |p: usize| (p % w + p / w) % 2;
-        let side = |s: usize| -> Vec<usize> {
-            (0..w * h).filter(|p| window[*p] && odd(*p) == s).collect()
-        };
-        let sides = [side(0), side(1)];
         for _ in 0..SWEEPS {
             let mut most = 0.0f32;
-            for &p in sides.iter().flatten() {
+            for &p in window.iter().flatten() {
                 // Without a neighbour the weight is 0, whichever pixel is used in its
                 // place.
-                let towards = |q: usize| 2.0 * belief[q.min(w * h - 1)] - 1.0;
+                let towards = |q: usize| 2.0 * belief[q.min(n - 1)] - 1.0;
                 let pull = self.left[p] * towards(p.saturating_sub(1))
                     + self.left[p + 1] * towards(p + 1)
                     + self.above[p] * towards(p.saturating_sub(w))

@@ -1,9 +1,11 @@
 //! Regions enclosed by clean contours, for use without a photograph.
 
-use super::area::{Area, components};
+use super::area::Area;
+use super::components::components;
 use super::mirror::symmetry;
+use super::pixels::Pixels;
 use super::rim::Edges;
-use super::score::suppressed;
+use super::score::{Scored, suppressed};
 use super::{Candidate, CandidateOptions, LEAST, OVERLAP};
 use crate::vision::ContourMap;
 use crate::vision::detect::gradient::Gradient;
@@ -32,32 +34,30 @@ pub fn enclosed(map: &ContourMap, options: &CandidateOptions) -> Vec<Candidate> 
     let (w, h) = (small.width as usize, small.height as usize);
     let lines = drawn(&small);
     let least = (LEAST * (w * h) as f64) as usize;
-    let regions = GAPS.iter().flat_map(|gap| closed(w, h, &lines, *gap, least));
-    let score = |area: &Area| symmetry(area).powi(4) * (area.count as f64 / (w * h) as f64).sqrt();
-    let regions = regions.map(|area| (score(&area), area)).collect();
+    let regions = GAPS.iter().flat_map(|gap| closed(&lines, *gap, least));
+    let bounded = |area: Area| Scored::bounded((area.count as f64 / (w * h) as f64).sqrt(), area);
+    let symmetric = |area: &Area| symmetry(area).powi(4);
+    let best = suppressed(regions.map(bounded), symmetric, OVERLAP, options.most);
     let gradient = across(&small);
     let edges = Edges { gradient: &gradient, strong: 1.0 };
     let scale = [f64::from(map.width) / w as f64, f64::from(map.height) / h as f64];
-    let candidate = |(score, area)| Candidate::new(score, area, &edges, scale);
-    suppressed(regions, OVERLAP, options.most).into_iter().filter_map(candidate).collect()
+    best.into_iter().filter_map(|scored| Candidate::new(&scored, &edges, scale)).collect()
 }
 
 /// Returns the regions of at least `least` pixels that lines enclose after dilation by
 /// `by` pixels, with the dilation undone.
-fn closed(w: usize, h: usize, lines: &[bool], by: usize, least: usize) -> Vec<Area> {
-    let Some(wide) = Area::new(w, h, lines.to_vec()) else { return Vec::new() };
-    let Some(wide) = Area::new(w, h, wide.dilated(by)).map(Area::filled) else { return Vec::new() };
-    let outside = Area::new(w, h, wide.on.iter().map(|on| !on).collect());
-    let outside = outside.map_or_else(|| vec![false; w * h], |o| o.dilated(by));
-    let (of, sizes) = components(w, h, |p| u32::from(!outside[p]));
+fn closed(lines: &Pixels, by: usize, least: usize) -> Vec<Area> {
+    let (w, h) = (lines.width, lines.height);
+    let Some(wide) = Area::of(lines.dilated(by)).map(Area::filled) else { return Vec::new() };
+    let outside = wide.pixels.complement().dilated(by);
+    let inside = outside.complement().bools();
+    let (of, sizes) = components(w, &inside);
     let region = |(number, size): (usize, &usize)| {
         if *size < least {
             return None;
         }
-        let on = |p: usize| !outside[p] && of[p] == number as u32;
-        let area = Area::new(w, h, (0..w * h).map(on).collect())?;
-        let line = area.on.iter().zip(lines).filter(|(on, line)| **on && **line).count();
-        ((line as f64) < LINES * area.count as f64).then_some(area)
+        let area = Area::of(Pixels::new(w, h, |p| of[p] == number as u32 && inside[p]))?;
+        ((area.shared(lines) as f64) < LINES * area.count as f64).then_some(area)
     };
     sizes.iter().enumerate().filter_map(region).collect()
 }
@@ -68,13 +68,14 @@ fn pixel(map: &ContourMap, x: f32, y: f32) -> Option<usize> {
     inside.then(|| y as usize * map.width as usize + x as usize)
 }
 
-/// Marks the pixels that contours run through.
-fn drawn(map: &ContourMap) -> Vec<bool> {
-    let mut on = vec![false; map.width as usize * map.height as usize];
+/// Returns the pixels that contours run through.
+fn drawn(map: &ContourMap) -> Pixels {
+    let (width, height) = (map.width as usize, map.height as usize);
+    let mut on = Pixels::none(width, height);
     for (((x, y), tx), ty) in map.x.iter().zip(&map.y).zip(&map.tx).zip(&map.ty) {
         for by in [-REACH, 0.0, REACH] {
             if let Some(p) = pixel(map, x + by * tx, y + by * ty) {
-                on[p] = true;
+                on.insert(p % width, p / width);
             }
         }
     }

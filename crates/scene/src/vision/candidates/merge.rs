@@ -4,6 +4,7 @@
 
 use super::area::Area;
 use super::picture::Picture;
+use super::pixels::Pixels;
 
 /// Number of bins of each of L*, a* and b*.
 const BINS: usize = 20;
@@ -30,8 +31,7 @@ struct Region {
     colour: [f32; 3 * BINS],
     /// Fractions of the pixels by gradient.
     texture: [f32; DIRECTIONS * STRENGTHS],
-    /// The segments that it consists of.
-    segments: Vec<usize>,
+    pixels: Pixels,
 }
 
 /// Two neighbours, with the sum of the gradient along their border, its length, and their
@@ -57,13 +57,15 @@ fn mixed<const N: usize>(a: &[f32; N], b: &[f32; N], (wa, wb): (f32, f32)) -> [f
 
 impl Region {
     fn joined(&self, other: &Region) -> Region {
+        let mut pixels = self.pixels.clone();
+        pixels.add(&other.pixels);
         let (a, b, weights) = (self.bounds, other.bounds, (self.size, other.size));
         Region {
             size: self.size + other.size,
             bounds: [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])],
             colour: mixed(&self.colour, &other.colour, weights),
             texture: mixed(&self.texture, &other.texture, weights),
-            segments: [&*self.segments, &*other.segments].concat(),
+            pixels,
         }
     }
 }
@@ -75,7 +77,7 @@ fn regions(picture: &Picture, labels: &[u32], count: usize) -> Vec<Region> {
         bounds: [picture.width, picture.height, 0, 0],
         colour: [0.0; 3 * BINS],
         texture: [0.0; DIRECTIONS * STRENGTHS],
-        segments: Vec::new(),
+        pixels: Pixels::none(picture.width, picture.height),
     };
     let mut all = vec![empty; count];
     for (p, label) in labels.iter().enumerate() {
@@ -83,6 +85,7 @@ fn regions(picture: &Picture, labels: &[u32], count: usize) -> Vec<Region> {
         let (i, j, b) = (p % picture.width, p / picture.width, r.bounds);
         r.bounds = [b[0].min(i), b[1].min(j), b[2].max(i + 1), b[3].max(j + 1)];
         r.size += 1.0;
+        r.pixels.insert(i, j);
         let [l, u, v] = picture.lab[p];
         for (c, part) in [l / 100.0, (u + 60.0) / 120.0, (v + 60.0) / 120.0].into_iter().enumerate()
         {
@@ -90,9 +93,8 @@ fn regions(picture: &Picture, labels: &[u32], count: usize) -> Vec<Region> {
         }
         r.texture[texture(picture.slope.0[p], picture.slope.1[p])] += 1.0;
     }
-    for (s, r) in all.iter_mut().enumerate() {
+    for r in &mut all {
         r.colour.iter_mut().chain(&mut r.texture).for_each(|v| *v /= r.size.max(1.0));
-        r.segments.push(s);
     }
     all
 }
@@ -178,17 +180,8 @@ pub fn merge(
             pairs[i].alike = alike(picture, rule, &all, &pairs[i]);
         }
     }
-    let fits = |r: &&Region| (least..=most).contains(&(r.size as usize));
-    let area = |r: &Region| {
-        let mut member = vec![false; *count];
-        r.segments.iter().for_each(|s| member[*s] = true);
-        Area::new(
-            picture.width,
-            picture.height,
-            labels.iter().map(|l| member[*l as usize]).collect(),
-        )
-    };
-    all.iter().filter(fits).filter_map(area).collect()
+    let fits = |r: &Region| (least..=most).contains(&(r.size as usize));
+    all.into_iter().filter(fits).filter_map(|r| Area::of(r.pixels)).collect()
 }
 
 /// Updates the pairs after `joined` has become region `new`, so that each of its

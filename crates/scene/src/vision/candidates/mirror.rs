@@ -23,9 +23,12 @@ pub struct Mirror {
     pub offset: f64,
     /// The centroid.
     pub centre: [f64; 2],
+    /// How many of the shape's points have their mirror image in the region.
+    hits: usize,
 }
 
-/// A region's points relative to its centroid.
+/// A region's points relative to its centroid, those near its outline first: whether their
+/// mirror images are in the region tells mirrors apart.
 struct Shape<'a> {
     area: &'a Area,
     centre: [f64; 2],
@@ -41,21 +44,34 @@ impl Shape<'_> {
         }
         let centre = centre.map(|c| c / area.count as f64);
         let step = area.count.div_ceil(most).max(1);
+        let inner = area.pixels.inner().inner();
+        let (deep, near): (Vec<_>, Vec<_>) =
+            area.points().step_by(step).partition(|(i, j)| inner.has(*i, *j));
         let about =
             |(i, j): (usize, usize)| [i as f64 + 0.5 - centre[0], j as f64 + 0.5 - centre[1]];
-        Shape { area, centre, points: area.points().step_by(step).map(about).collect() }
+        Shape { area, centre, points: near.into_iter().chain(deep).map(about).collect() }
     }
 
     /// Returns the mirror at an angle and offset, with its symmetry.
     fn mirror(&self, angle: f64, offset: f64) -> Mirror {
+        let none = Mirror { symmetry: 0.0, angle, offset, centre: self.centre, hits: 0 };
+        self.better(angle, offset, &none).unwrap_or(none)
+    }
+
+    /// Returns the mirror at an angle and offset if its symmetry exceeds that of another.
+    fn better(&self, angle: f64, offset: f64, than: &Mirror) -> Option<Mirror> {
         let (nx, ny) = (libm::cos(angle), libm::sin(angle));
-        let hits = self.points.iter().filter(|[x, y]| {
+        let mut left = self.points.len().checked_sub(than.hits + 1)?;
+        for [x, y] in &self.points {
             let twice = 2.0 * (nx * x + ny * y - offset);
-            self.area.at(x - twice * nx + self.centre[0], y - twice * ny + self.centre[1])
-        });
-        let hits = hits.count() as f64;
-        let symmetry = hits / (2.0 * self.points.len() as f64 - hits);
-        Mirror { symmetry, angle, offset, centre: self.centre }
+            let (x, y) = (x - twice * nx + self.centre[0], y - twice * ny + self.centre[1]);
+            if !self.area.at(x, y) {
+                left = left.checked_sub(1)?;
+            }
+        }
+        let hits = than.hits + 1 + left;
+        let symmetry = hits as f64 / (2 * self.points.len() - hits) as f64;
+        Some(Mirror { symmetry, angle, offset, centre: self.centre, hits })
     }
 
     /// Returns the best mirror near another: steps of the given size in angle and offset,
@@ -66,11 +82,9 @@ impl Shape<'_> {
             let (a, o) = (angle / f64::from(1 << h), offset / f64::from(1 << h));
             // A few steps at each size suffice, since the scan is already close.
             for _ in 0..3 {
-                let tries = [(-a, 0.0), (a, 0.0), (0.0, -o), (0.0, o)];
                 let last = best;
-                for (da, d) in tries {
-                    let next = self.mirror(last.angle + da, last.offset + d);
-                    best = if next.symmetry > best.symmetry { next } else { best };
+                for (da, d) in [(-a, 0.0), (a, 0.0), (0.0, -o), (0.0, o)] {
+                    best = self.better(last.angle + da, last.offset + d, &best).unwrap_or(best);
                 }
                 if best.symmetry <= last.symmetry {
                     break;
@@ -91,9 +105,12 @@ fn between(a: f64, b: f64) -> f64 {
 /// regions.
 pub fn symmetry(area: &Area) -> f64 {
     let shape = Shape::of(area, SAMPLE);
-    let scan = (0..ANGLES / 2).map(|i| shape.mirror(PI * i as f64 / (ANGLES / 2) as f64, 0.0));
-    let best = scan.reduce(|best, m| if m.symmetry > best.symmetry { m } else { best });
-    best.map_or(0.0, |b| shape.refined(b, PI / 60.0, 1.0, 1).symmetry)
+    let mut best = shape.mirror(0.0, 0.0);
+    for i in 1..ANGLES / 2 {
+        let angle = PI * i as f64 / (ANGLES / 2) as f64;
+        best = shape.better(angle, 0.0, &best).unwrap_or(best);
+    }
+    shape.refined(best, PI / 60.0, 1.0, 1).symmetry
 }
 
 /// Returns the best mirror, and the best one in a different direction.

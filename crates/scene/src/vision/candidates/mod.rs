@@ -11,12 +11,14 @@
 
 mod area;
 mod clusters;
+mod components;
 mod cut;
 mod enclosed;
 mod felzenszwalb;
 mod merge;
 mod mirror;
 mod picture;
+mod pixels;
 mod profile;
 mod rim;
 mod score;
@@ -29,9 +31,11 @@ use cut::Field;
 pub use enclosed::enclosed;
 use felzenszwalb::{Edges, felzenszwalb};
 use merge::{Rule, merge};
+use pcadlang_numerics::platform::threads::map_side_by_side;
 use picture::Picture;
+use pixels::Pixels;
 pub use rim::tilts;
-use score::{Judge, suppressed};
+use score::{Judge, Scored, suppressed};
 
 /// Minimum and maximum size of regions, as a fraction of the picture.
 const LEAST: f64 = 0.004;
@@ -96,46 +100,48 @@ pub fn candidates(photo: &Photo, options: &CandidateOptions) -> Vec<Candidate> {
     let (width, height) = (f64::from(photo.width()), f64::from(photo.height()));
     let scale = [width / picture.width as f64, height / picture.height as f64];
     let edges = rim::Edges { gradient: &picture.gradient, strong: picture.strong };
-    let candidate = |(score, area)| Candidate::new(score, area, &edges, scale);
-    found(&picture, options.most).into_iter().filter_map(candidate).collect()
+    let found = found(&picture, options.most);
+    let all = map_side_by_side(&found, |scored| Candidate::new(scored, &edges, scale));
+    all.into_iter().flatten().collect()
 }
 
 impl Candidate {
     /// Builds a candidate from a region of a picture with these edges, where a pixel is
     /// `scale` pixels of the photograph.
-    fn new(score: f64, area: Area, edges: &rim::Edges, scale: [f64; 2]) -> Option<Candidate> {
+    fn new(scored: &Scored, edges: &rim::Edges, scale: [f64; 2]) -> Option<Candidate> {
+        let Scored { score, area, .. } = scored;
         let axes =
-            mirror::mirrors(&area).iter().map(|m| profile::axis(edges, &area, m, scale)).collect();
-        let mask = Mask::new(area.width as u32, area.height as u32, area.on).ok()?;
-        Some(Candidate { score, mask, axes })
+            mirror::mirrors(area).iter().map(|m| profile::axis(edges, area, m, scale)).collect();
+        let Pixels { width, height, .. } = &area.pixels;
+        let mask = Mask::new(*width as u32, *height as u32, area.pixels.bools()).ok()?;
+        Some(Candidate { score: *score, mask, axes })
     }
 }
 
 /// Returns the best regions with their scores.
-fn found(picture: &Picture, most: usize) -> Vec<(f64, Area)> {
+fn found(picture: &Picture, most: usize) -> Vec<Scored> {
     let field = Field::new(picture, clusters::codebook(picture));
     let judge = Judge::new(picture, &field.codewords);
-    let scored = |area: Area| (judge.score(&area), area);
-    let regions =
-        suppressed(regions(picture).into_iter().map(scored).collect(), OVERLAP, SEEDS.max(most));
-    let cuts = regions.iter().take(SEEDS).filter_map(|(_, seed)| field.cut(seed));
-    let cuts: Vec<_> = cuts.map(scored).collect();
-    let parts = suppressed(cuts.into_iter().chain(regions).collect(), OVERLAP, most.max(PARTS));
-    let wholes: Vec<_> = wholes(&parts).into_iter().map(scored).collect();
-    suppressed(wholes.into_iter().chain(parts).collect(), OVERLAP, most)
+    let bounded = |area: Area| Scored::bounded(judge.bound(&area), area);
+    let best = |all: Vec<Scored>, most| suppressed(all, |area| judge.likeness(area), OVERLAP, most);
+    let regions = best(regions(picture).into_iter().map(bounded).collect(), SEEDS.max(most));
+    let cuts = map_side_by_side(&regions[..SEEDS.min(regions.len())], |seed| field.cut(&seed.area));
+    let cuts = cuts.into_iter().flatten().map(bounded);
+    let parts = best(cuts.chain(regions).collect(), most.max(PARTS));
+    let wholes: Vec<Scored> = wholes(&parts).into_iter().map(bounded).collect();
+    best(wholes.into_iter().chain(parts).collect(), most)
 }
 
 /// Joins neighbours among the best regions, for objects of two colours, such as a lamp's
 /// foot and shade.
-fn wholes(parts: &[(f64, Area)]) -> Vec<Area> {
-    let parts: Vec<&Area> = parts.iter().take(PARTS).map(|(_, area)| area).collect();
-    let near: Vec<Area> =
-        parts.iter().filter_map(|a| Area::new(a.width, a.height, a.dilated(1))).collect();
+fn wholes(parts: &[Scored]) -> Vec<Area> {
+    let parts: Vec<&Area> = parts.iter().take(PARTS).map(|scored| &scored.area).collect();
+    let near: Vec<Pixels> = parts.iter().map(|a| a.dilated(1)).collect();
     let mut out = Vec::new();
     for (i, a) in parts.iter().enumerate() {
         for (b, near) in parts.iter().zip(&near).take(i) {
             // Side by side: they overlap little, and touch.
-            if 20 * a.shared(b) <= a.count.min(b.count) && a.shared(near) >= TOUCHING {
+            if 20 * a.shared(&b.pixels) <= a.count.min(b.count) && a.shared(near) >= TOUCHING {
                 out.extend(a.union(b).map(Area::filled));
             }
         }
@@ -143,19 +149,30 @@ fn wholes(parts: &[(f64, Area)]) -> Vec<Area> {
     out
 }
 
+/// What regions are made from.
+enum Source<'a> {
+    /// Segments that are merged.
+    Segments(&'a (Vec<u32>, usize), Rule),
+    /// Clusters of colours, with these weights of position and variation.
+    Colours([f32; 2]),
+}
+
 /// Returns all regions from segments and clusters, without holes.
 fn regions(picture: &Picture) -> Vec<Area> {
     let part = |p: f64| (p * picture.pixels() as f64).ceil() as usize;
     let (least, most) = (part(LEAST), part(MOST));
     let edges = Edges::of(picture);
-    let mut out = Vec::new();
-    for (k, smallest) in [(20.0, 25), (60.0, 40)] {
-        let segments = felzenszwalb(&edges, k, smallest);
-        for rule in [Rule::Likeness, Rule::Edges] {
-            out.extend(merge(picture, &segments, rule, least, most));
-        }
-    }
-    out.extend(clusters::regions(picture, least));
-    let filled = out.into_iter().map(Area::filled);
-    filled.filter(|a| a.count <= most).collect()
+    let segments = [(20.0, 25), (60.0, 40)].map(|(k, smallest)| felzenszwalb(&edges, k, smallest));
+    let rules = [Rule::Likeness, Rule::Edges];
+    let merges = segments.iter().flat_map(|s| rules.map(|rule| Source::Segments(s, rule)));
+    let sources: Vec<Source> = merges.chain(clusters::WEIGHTS.map(Source::Colours)).collect();
+    let out = map_side_by_side(&sources, |source| {
+        let areas = match source {
+            Source::Segments(segments, rule) => merge(picture, segments, *rule, least, most),
+            Source::Colours(weights) => clusters::regions(picture, *weights, least),
+        };
+        let filled = areas.into_iter().map(Area::filled);
+        filled.filter(|a| a.count <= most).collect::<Vec<_>>()
+    });
+    out.into_iter().flatten().collect()
 }

@@ -4,6 +4,8 @@ use super::area::Area;
 use super::clusters::LETTERS;
 use super::mirror::symmetry;
 use super::picture::Picture;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
 /// Minimum symmetry of an object of revolution, whatever its other properties.
 const SYMMETRIC: f64 = 0.5;
@@ -32,29 +34,31 @@ impl Judge<'_> {
         }
     }
 
-    /// Returns the score of a region, at least 0. Symmetry is what distinguishes objects
-    /// of revolution from others. The other factors are edges along the outline, contrast
-    /// with the surrounding colours, little outline at the picture's frame, and a
-    /// sufficient size.
-    pub fn score(&self, area: &Area) -> f64 {
-        let part = area.count as f64 / area.on.len() as f64;
+    /// Returns the factors of a region's score that are fast to compute: edges along the
+    /// outline, little outline at the picture's frame, and a sufficient size; at least 0.
+    pub fn bound(&self, area: &Area) -> f64 {
+        let part = area.count as f64 / self.edges.len() as f64;
         let fade = ((0.65 - part) / 0.15).clamp(0.0, 1.0);
+        if fade == 0.0 {
+            return 0.0;
+        }
         let (outline, framed) = area.outline();
         let border = framed as f64 / outline.len() as f64;
         let inside = (1.0 - 4.0 * border).max(0.0);
-        if fade * inside == 0.0 {
-            return 0.0;
-        }
         let support =
             outline.iter().map(|p| f64::from(self.edges[*p])).sum::<f64>() / outline.len() as f64;
-        let size = part.min(0.15).sqrt();
+        support * inside * part.min(0.15).sqrt() * fade
+    }
+
+    /// Returns the other factors, 0 to 1. Symmetry is what distinguishes objects of
+    /// revolution from others; the other one is contrast with the surrounding colours.
+    pub fn likeness(&self, area: &Area) -> f64 {
         let symmetry = symmetry(area);
         if symmetry < SYMMETRIC {
             return 0.0;
         }
         let chi = self.contrast(area);
-        let symmetry = symmetry * symmetry;
-        symmetry * symmetry * support * chi * chi * inside * size * fade
+        symmetry.powi(4) * chi * chi
     }
 
     /// Returns one minus the Bhattacharyya coefficient between the letters of a region
@@ -62,8 +66,9 @@ impl Judge<'_> {
     fn contrast(&self, area: &Area) -> f64 {
         let ring = area.dilated((0.15 * (area.count as f64).sqrt()).max(3.0) as usize);
         let mut counts = [[0u32; LETTERS]; 2];
-        for (p, _) in ring.iter().enumerate().filter(|(_, inside)| **inside) {
-            counts[usize::from(area.on[p])][usize::from(self.codewords[p])] += 1;
+        for (i, j) in ring.points() {
+            let letter = self.codewords[j * ring.width + i];
+            counts[usize::from(area.pixels.has(i, j))][usize::from(letter)] += 1;
         }
         let totals = counts.map(|c| f64::from(c.iter().sum::<u32>()));
         if totals[0] == 0.0 {
@@ -75,19 +80,76 @@ impl Judge<'_> {
     }
 }
 
+/// A region with its score.
+pub struct Scored {
+    pub score: f64,
+    pub area: Area,
+    /// Whether the score is only a bound so far.
+    bound: bool,
+}
+
+impl Scored {
+    /// A region with a bound on its score.
+    pub fn bounded(bound: f64, area: Area) -> Scored {
+        Scored { score: bound, area, bound: true }
+    }
+}
+
 /// Returns the best regions by score, at most `most`, none of which overlaps a better one
-/// by more than `overlap` (intersection over union).
-pub fn suppressed(mut scored: Vec<(f64, Area)>, overlap: f64, most: usize) -> Vec<(f64, Area)> {
-    // A stable sort: equal scores stay in their original order.
-    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut kept: Vec<(f64, Area)> = Vec::new();
-    for (score, area) in scored {
-        if kept.len() == most {
-            break;
+/// by more than `overlap` (intersection over union). The score is the bound times `likeness`,
+/// 0 to 1, which is worked out only for regions that may be among the best.
+pub fn suppressed(
+    regions: impl IntoIterator<Item = Scored>,
+    likeness: impl Fn(&Area) -> f64,
+    overlap: f64,
+    most: usize,
+) -> Vec<Scored> {
+    let mut waiting: BinaryHeap<Waiting> = regions
+        .into_iter()
+        .enumerate()
+        .map(|(number, scored)| Waiting { scored, number })
+        .collect();
+    let mut kept: Vec<Scored> = Vec::new();
+    while kept.len() < most
+        && let Some(Waiting { mut scored, number }) = waiting.pop()
+        && scored.score > 0.0
+    {
+        if kept.iter().any(|k| k.area.overlaps(&scored.area, overlap)) {
+            continue;
         }
-        if score > 0.0 && kept.iter().all(|(_, k)| !k.overlaps(&area, overlap)) {
-            kept.push((score, area));
+        if scored.bound {
+            scored.score *= likeness(&scored.area);
+            scored.bound = false;
+            waiting.push(Waiting { scored, number });
+        } else {
+            kept.push(scored);
         }
     }
     kept
 }
+
+/// A region in the queue: the highest score first, and the first in the list among equals.
+struct Waiting {
+    scored: Scored,
+    number: usize,
+}
+
+impl Ord for Waiting {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.scored.score.total_cmp(&other.scored.score).then(other.number.cmp(&self.number))
+    }
+}
+
+impl PartialOrd for Waiting {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Waiting {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Waiting {}

@@ -156,10 +156,14 @@ fn any_photo_gives_a_sane_list() {
     check_list(&photo(60, 40, &|i, _| if i < 30 { [0; 3] } else { [255; 3] }), &options);
 }
 
+fn pixels_where(width: usize, height: usize, on: impl Fn(usize) -> bool) -> Option<Area> {
+    Area::of(Pixels::new(width, height, on))
+}
+
 /// An area drawn in rows, where `#` is on.
 fn area(rows: &[&str]) -> Area {
-    let on = rows.iter().flat_map(|r| r.bytes()).map(|b| b == b'#').collect();
-    Area::new(rows[0].len(), rows.len(), on).unwrap()
+    let width = rows[0].len();
+    pixels_where(width, rows.len(), |p| rows[p / width].as_bytes()[p % width] == b'#').unwrap()
 }
 
 #[test]
@@ -174,14 +178,14 @@ fn areas() {
     let open = area(&["......", ".####.", ".#..#.", ".##.#.", "......"]);
     assert_eq!(open.clone().filled(), open);
     assert_eq!(open.union(&ring), Some(ring.clone()));
-    assert!(Area::new(2, 1, vec![false; 2]).is_none());
+    assert!(pixels_where(2, 1, |_| false).is_none());
     let dot = area(&["....", "....", ".#..", "...."]);
     let dilated = area(&["....", "###.", "###.", "###."]);
-    assert_eq!(dot.dilated(1), dilated.on);
+    assert_eq!(dot.dilated(1), dilated.pixels);
     assert_eq!(dilated.outline(), (vec![4, 5, 6, 8, 10, 12, 13, 14], 5));
     let two = area(&["##..#", "....#", ".#..#"]);
-    assert_eq!(area::largest(5, 3, &two.on), Some(area(&["....#", "....#", "....#"])));
-    let (of, sizes) = area::components(5, 3, |p| u32::from(two.on[p]));
+    assert_eq!(area::largest(5, &two.pixels.bools()), Some(area(&["....#", "....#", "....#"])));
+    let (of, sizes) = components::components(5, &two.pixels.bools());
     assert_eq!((sizes, of[0], of[4], of[14]), (vec![2, 9, 3, 1], 0, 2, 2));
 }
 
@@ -194,7 +198,7 @@ fn mirrors_of_a_leaning_ellipse() {
         let (along, across) = (x * s - y * c, x * c + y * s);
         (along / 25.0).powi(2) + (across / 11.0).powi(2) <= 1.0
     };
-    let area = Area::new(80, 60, (0..80 * 60).map(|p| inside(p % 80, p / 80)).collect()).unwrap();
+    let area = pixels_where(80, 60, |p| inside(p % 80, p / 80)).unwrap();
     let mirrors = mirror::mirrors(&area);
     assert_eq!(mirrors.len(), 2);
     let off = mirrors.iter().map(|m| (m.angle - lean).rem_euclid(std::f64::consts::FRAC_PI_2));
@@ -205,7 +209,7 @@ fn mirrors_of_a_leaning_ellipse() {
     assert!(mirror::symmetry(&area) > 0.93);
     // A half of it, cut obliquely to its axes, is less symmetric.
     let half = |p: usize| inside(p % 80, p / 80) && p % 80 < 40;
-    let half = Area::new(80, 60, (0..80 * 60).map(half).collect()).unwrap();
+    let half = pixels_where(80, 60, half).unwrap();
     assert!(mirror::symmetry(&half) < 0.9);
 }
 
@@ -225,14 +229,14 @@ fn segments_and_regions_of_plain_colours() {
     assert!(at(24, 21) == at(24, 42) && at(5, 5) == at(60, 60));
     assert!((3..12).contains(&segments.1), "{} segments", segments.1);
     let whole = |p: usize| (20..44).contains(&(p % 64)) && (20..44).contains(&(p / 64));
-    let whole = Area::new(64, 64, (0..64 * 64).map(whole).collect()).unwrap();
+    let whole = pixels_where(64, 64, whole).unwrap();
     let best = |all: &[Area]| all.iter().map(|a| a.iou(&whole)).fold(0.0, f64::max);
     for rule in [Rule::Likeness, Rule::Edges] {
         let all = merge(&picture, &segments, rule, 16, 3000);
         assert!(best(&all) > 0.85, "{}", best(&all));
         assert!(all.iter().all(|a| (16..=3000).contains(&a.count)));
     }
-    assert!(best(&clusters::regions(&picture, 16)) > 0.9);
+    assert!(best(&clusters::regions(&picture, clusters::WEIGHTS[0], 16)) > 0.9);
 }
 
 #[test]
@@ -240,20 +244,26 @@ fn a_cut_moves_to_the_object() {
     let (photo, truth) = vase(0.1);
     let picture = Picture::of(&photo, 128);
     let truth = truth.resized(picture.width as u32, picture.height as u32);
-    let truth = Area::new(picture.width, picture.height, truth.data().to_vec()).unwrap();
+    let truth = pixels_where(picture.width, picture.height, |p| truth.data()[p]).unwrap();
     // Its shape, shifted slightly.
-    let seed = |p: usize| p % picture.width >= 2 && truth.on[p - 2];
-    let seed = Area::new(picture.width, picture.height, (0..picture.pixels()).map(seed).collect())
-        .unwrap();
+    let w = picture.width;
+    let seed = |p: usize| p % w >= 2 && truth.pixels.has(p % w - 2, p / w);
+    let seed = pixels_where(w, picture.height, seed).unwrap();
     let field = Field::new(&picture, clusters::codebook(&picture));
     let cut = field.cut(&seed).unwrap();
     let (before, after) = (seed.iou(&truth), cut.iou(&truth));
     assert!(after > 0.94 && before < 0.88, "{after} from {before}");
     let judge = Judge::new(&picture, &field.codewords);
-    assert!(judge.score(&truth) > judge.score(&seed));
-    let twice = suppressed(vec![(0.2, cut.clone()), (0.3, truth.clone()), (0.0, seed)], 0.99, 9);
-    assert_eq!(twice.iter().map(|(s, _)| *s).collect::<Vec<_>>(), [0.3, 0.2]);
-    assert_eq!(suppressed(vec![(0.2, truth.clone()), (0.3, truth)], OVERLAP, 9).len(), 1);
+    let score = |area: &Area| judge.bound(area) * judge.likeness(area);
+    assert!(score(&truth) > score(&seed));
+    let best = |all: &[(f64, &Area)], overlap| {
+        let all = all.iter().map(|(score, area)| Scored::bounded(*score, (*area).clone()));
+        let kept = suppressed(all, |area| if *area == seed { 0.1 } else { 1.0 }, overlap, 9);
+        kept.iter().map(|scored| scored.score).collect::<Vec<_>>()
+    };
+    assert_eq!(best(&[(0.2, &cut), (0.3, &truth), (0.0, &seed)], 0.99), [0.3, 0.2]);
+    assert_eq!(best(&[(0.2, &cut), (0.1, &truth), (1.0, &seed)], 0.99), [0.2, 0.1, 0.1]);
+    assert_eq!(best(&[(0.2, &truth), (0.3, &truth)], OVERLAP).len(), 1);
 }
 
 /// A bright vessel before a darker background, seen from above by a tilt: a cylinder with
