@@ -10,7 +10,7 @@ use crate::lang::builtins::{
 };
 use crate::lang::error::Fault;
 use crate::lang::value::{Likelihood, Value};
-use crate::render::{Frame, View};
+use crate::render::{Camera, Frame, View};
 use crate::rng::Stream;
 use crate::vision::chamfer::{self, Mode};
 use crate::vision::contour_ratio;
@@ -88,15 +88,18 @@ pub(super) const TABLE: &[Row] = &[
             opt("eps_in", Type::Num, "0.05", "The probability that an object pixel is observed as background."),
             opt("eps_out", Type::Num, "0.05", "The probability that a background pixel is observed as object."),
             SIZE,
+            opt("partial", Type::Bool, "false", "Whether pixels that the object covers in part count in part. The score is then nearly continuous, as Hamiltonian kernels need it."),
         ],
         Type::Likelihood,
         "The probability of an observed mask: pixels flip independently.",
         |a| {
             let (eps_in, eps_out) = (a.num_or(1, 0.05)?, a.num_or(2, 0.05)?);
-            likelihood(MaskOf { view: view(a)?, size: size(a, 3)?, eps: [eps_in, eps_out] })
+            let partial = a.bool_or(4, false)?;
+            let (view, size) = (view(a)?, size(a, 3)?);
+            likelihood(MaskOf { view, size, eps: [eps_in, eps_out], partial })
         },
     )
-    .vjp(|_, _, by| Some(by_view(by.clone(), 3))),
+    .vjp(|_, _, by| Some(by_view(by.clone(), 4))),
     incremental(
         "depth",
         SECTION,
@@ -365,11 +368,13 @@ struct MaskOf {
     view: Arc<View>,
     size: u32,
     eps: [f64; 2],
+    /// Whether pixels are covered in part.
+    partial: bool,
 }
 
 impl MaskOf {
-    /// Returns the observed mask, prepared at the rendered size, and the rendered frame.
-    fn prepared(&self, observed: &Value) -> Result<(Arc<MaskLikelihood>, Arc<Frame>), String> {
+    /// Returns the observed mask, prepared at the rendered size.
+    fn prepared(&self, observed: &Value) -> Result<Arc<MaskLikelihood>, String> {
         let Some(mask) = observed.downcast::<MaskValue>() else {
             return Err(format!(
                 "scene.mask: the observed value must be a mask, got {}",
@@ -377,14 +382,16 @@ impl MaskOf {
             ));
         };
         same_shape((mask.mask.width(), mask.mask.height()), &self.view, self.name())?;
-        let frame = self.view.depth(self.size);
-        let prepared =
-            mask.prepared.get((self.eps, frame.width, frame.height), |([i, o], w, h)| {
-                MaskLikelihood::new(&mask.mask, *i, *o)
-                    .map(|l| l.resized(*w, *h))
-                    .map_err(|e| format!("scene.mask: {e}"))
-            })?;
-        Ok((prepared, frame))
+        let Camera { width, height, .. } = self.view.camera().scaled_to(self.size);
+        mask.prepared.get((self.eps, width, height), |([i, o], w, h)| {
+            MaskLikelihood::new(&mask.mask, *i, *o)
+                .map(|l| l.resized(*w, *h))
+                .map_err(|e| format!("scene.mask: {e}"))
+        })
+    }
+
+    fn rendered(&self) -> Vec<bool> {
+        self.view.depth(self.size).mask().collect()
     }
 }
 
@@ -398,19 +405,26 @@ impl Likelihood for MaskOf {
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
-        let (prepared, frame) = self.prepared(observed)?;
-        let rendered: Vec<bool> = frame.mask().collect();
-        prepared
-            .log_likelihood(&rendered, frame.width, frame.height)
-            .map_err(|e| format!("scene.mask: {e}"))
+        let prepared = self.prepared(observed)?;
+        let (width, height) = (prepared.observed().width(), prepared.observed().height());
+        match self.partial {
+            true => {
+                let fractions = self.view.fractions(self.size);
+                prepared.log_likelihood_coverage(&fractions, width, height)
+            }
+            false => prepared.log_likelihood(&self.rendered(), width, height),
+        }
+        .map_err(|e| format!("scene.mask: {e}"))
     }
 
     /// Draws a mask of the rendered size.
     fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
-        let draw = |(prepared, frame): (Arc<MaskLikelihood>, Arc<Frame>)| {
-            let rendered: Vec<bool> = frame.mask().collect();
-            let drawn =
-                prepared.simulate(&rendered, rng).map_err(|e| format!("scene.mask: {e}"))?;
+        let draw = |prepared: Arc<MaskLikelihood>| {
+            let drawn = match self.partial {
+                true => prepared.simulate_coverage(&self.view.fractions(self.size), rng),
+                false => prepared.simulate(&self.rendered(), rng),
+            };
+            let drawn = drawn.map_err(|e| format!("scene.mask: {e}"))?;
             Ok(Value::object(MaskValue::new(drawn)))
         };
         Some(self.prepared(observed).and_then(draw))
@@ -418,8 +432,13 @@ impl Likelihood for MaskOf {
 
     /// With respect to the view.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
-        let (prepared, _) = self.prepared(observed).ok()?;
-        Some(by_silhouette(&self.view, self.size, &prepared.gains()))
+        let prepared = self.prepared(observed).ok()?;
+        if !self.partial {
+            return Some(by_silhouette(&self.view, self.size, &prepared.gains()));
+        }
+        let gains = prepared.gains_coverage(&self.view.fractions(self.size));
+        let vertices = self.view.vjp_fractions(self.size, &gains);
+        Some(BySolid { landmarks: Vec::new(), vertices }.into_adjoint())
     }
 }
 

@@ -127,6 +127,24 @@ impl Camera {
         Camera { width, height, projection, ..*self }
     }
 
+    /// The same view with each pixel cut into `by` by `by` pixels, `by` at least 1.
+    pub(super) fn finer(&self, by: u32) -> Camera {
+        let by = by.max(1);
+        let (width, height) = (self.width.saturating_mul(by), self.height.saturating_mul(by));
+        let by = f64::from(by);
+        let projection = match self.projection {
+            Projection::Pinhole { focal_px, cx, cy } => {
+                Projection::Pinhole { focal_px: focal_px * by, cx: cx * by, cy: cy * by }
+            }
+            Projection::Orthographic { units_per_pixel, cx, cy } => Projection::Orthographic {
+                units_per_pixel: units_per_pixel / by,
+                cx: cx * by,
+                cy: cy * by,
+            },
+        };
+        Camera { width, height, projection, ..*self }
+    }
+
     /// The pixel position of a scene point and its depth: the distance along the viewing
     /// axis, in scene units. At a depth of 0 or less a pinhole's position is meaningless
     /// (it may be infinite or NaN).

@@ -6,6 +6,7 @@
 
 use super::canvas::Canvas;
 use super::detail::Drawn;
+use super::pixels::fractions::Fractions;
 use super::{Camera, Channels, ContourChange, Contours, Frame, FrameChange, Scene};
 use crate::geom::Solid;
 use glam::DVec3;
@@ -26,6 +27,7 @@ pub struct View {
     /// `None` where the picture is better drawn in full.
     frame_changes: BySize<Option<Arc<FrameChange>>>,
     depths: BySize<Arc<Frame>>,
+    fractions: BySize<Arc<Fractions>>,
     contours: BySize<Arc<Contours>>,
     /// `None` where the picture is better drawn in full.
     changes: BySize<Option<Arc<ContourChange>>>,
@@ -60,6 +62,7 @@ impl View {
             frames: Mutex::default(),
             frame_changes: Mutex::default(),
             depths: Mutex::default(),
+            fractions: Mutex::default(),
             contours: Mutex::default(),
             changes: Mutex::default(),
             expected: Expected::default(),
@@ -147,6 +150,23 @@ impl View {
                     Some(depth) => Frame::of_depth(&camera, depth),
                     None => drawn_frame(&solid, &camera, Channels::Depth),
                 })
+            })
+        })
+    }
+
+    /// The fraction of each pixel that the solid covers, 0 to 1, row by row, in the picture
+    /// whose longer side has `size` pixels (0 counts as 1).
+    pub fn fractions(&self, size: u32) -> Arc<[f32]> {
+        Arc::clone(&self.covered(size).values)
+    }
+
+    /// The same, with what its derivatives need.
+    pub(super) fn covered(&self, size: u32) -> Arc<Fractions> {
+        once(&self.fractions, size, || {
+            let Scene { solid, camera } = self.scene(size);
+            Arc::new(match solid.revolution() {
+                Some(r) => Fractions::of_revolution(&r.surface, &r.affine, &camera),
+                None => Fractions::of(&solid, &camera),
             })
         })
     }

@@ -191,8 +191,14 @@ impl MaskLikelihood {
     ) -> Result<f64, VisionError> {
         self.check(coverage.len(), width, height)?;
         let mut sum = 0.0;
+        // Most pixels are covered wholly or not at all.
+        let whole = [0.0, 1.0].map(|c| [false, true].map(|o| libm::log(self.probability(c, o))));
         for (&c, &o) in coverage.iter().zip(&self.observed.data) {
             let c = f64::from(c);
+            if c == 0.0 || c == 1.0 {
+                sum += whole[usize::from(c == 1.0)][usize::from(o)];
+                continue;
+            }
             if !(0.0..=1.0).contains(&c) {
                 return Err(VisionError::Range {
                     name: "coverage",
@@ -200,13 +206,45 @@ impl MaskLikelihood {
                     value: c,
                 });
             }
-            let (hit, miss) = match o {
-                true => (1.0 - self.eps_in, self.eps_out),
-                false => (self.eps_in, 1.0 - self.eps_out),
-            };
-            sum += libm::log(c * hit + (1.0 - c) * miss);
+            sum += libm::log(self.probability(c, o));
         }
         Ok(sum)
+    }
+
+    /// The probability of what is observed at a pixel of which this fraction is covered.
+    fn probability(&self, fraction: f64, observed: bool) -> f64 {
+        let [miss, hit] = self.ends(observed);
+        fraction * hit + (1.0 - fraction) * miss
+    }
+
+    /// The same without and with the object there.
+    fn ends(&self, observed: bool) -> [f64; 2] {
+        match observed {
+            true => [self.eps_out, 1.0 - self.eps_in],
+            false => [1.0 - self.eps_out, self.eps_in],
+        }
+    }
+
+    /// Returns the derivative of [`MaskLikelihood::log_likelihood_coverage`] with respect to
+    /// the fraction of each pixel that is covered.
+    pub fn gains_coverage(&self, coverage: &[f32]) -> Vec<f64> {
+        let gain = |(c, o): (&f32, &bool)| {
+            let [miss, hit] = self.ends(*o);
+            (hit - miss) / self.probability(f64::from(*c), *o)
+        };
+        coverage.iter().zip(&self.observed.data).map(gain).collect()
+    }
+
+    /// Samples a mask given the fraction of every pixel that the rendered object covers.
+    pub fn simulate_coverage(
+        &self,
+        coverage: &[f32],
+        rng: &mut Stream,
+    ) -> Result<Mask, VisionError> {
+        self.check(coverage.len(), self.observed.width, self.observed.height)?;
+        let draw = |c: &f32| rng.uniform() < self.probability(f64::from(*c), true);
+        let data = coverage.iter().map(draw).collect();
+        Ok(Mask { data, ..self.observed })
     }
 
     /// Samples a mask given a rendered one of the same size.

@@ -13,6 +13,8 @@ use glam::DVec3;
 
 /// Distance from a piece at which to test for the background, in pixels.
 const BESIDE: f64 = 1.2;
+/// Number of positions along a piece at which a value of its pixels is read.
+const PARTS: i32 = 4;
 
 impl View {
     /// The derivatives of the sum of `gain` over the pixels that show the solid, in the
@@ -20,13 +22,46 @@ impl View {
     /// solid's meshes in turn, in world coordinates. `gain` has a number for each pixel,
     /// row by row.
     pub fn vjp_mask(&self, size: u32, gain: &[f64]) -> Vec<DVec3> {
+        self.vjp_outline(size, |picture, [x, y, ..], _| {
+            picture.between(gain, f64::from(x), f64::from(y))
+        })
+    }
+
+    /// The same of the sum of `gain` times the fraction of each pixel that shows the solid,
+    /// [`View::fractions`], which is no step function.
+    pub fn vjp_fractions(&self, size: u32, gain: &[f64]) -> Vec<DVec3> {
+        let camera = self.camera().scaled_to(size);
+        let drawn = self.drawn(&camera);
+        if drawn.solid.revolution().is_none()
+            && let Some(by_vertex) = self.covered(size).vjp(&drawn.solid, &camera, gain)
+        {
+            return drawn.by_vertices_of(self.solid(), by_vertex);
+        }
+        self.vjp_outline(size, |picture, piece, length| {
+            let [x, y, tx, ty] = piece.map(f64::from);
+            // A piece may run through several pixels.
+            let part = |k: i32| {
+                let along = f64::from(length) * f64::from(2 * k + 1 - PARTS) / f64::from(2 * PARTS);
+                picture.at(gain, x + along * tx, y + along * ty)
+            };
+            (0..PARTS).map(part).sum::<f64>() / f64::from(PARTS)
+        })
+    }
+
+    /// The same where a motion of the outline by a pixel gains `gain` for each pixel of its
+    /// length, along a piece: its middle and tangent, and its length.
+    fn vjp_outline(
+        &self,
+        size: u32,
+        gain: impl Fn(&Picture<'_>, [f32; 4], f32) -> f64,
+    ) -> Vec<DVec3> {
         let frame = self.depth(size);
         let camera = self.camera().scaled_to(size);
         let drawn = self.drawn(&camera);
         let picture = Picture { width: camera.width, height: camera.height, depth: &frame.depth };
         let by = |[x, y, tx, ty]: [f32; 4], length: f32| {
             let [nx, ny] = picture.outward([x, y, tx, ty])?;
-            let by = f64::from(length) * picture.between(gain, f64::from(x), f64::from(y));
+            let by = f64::from(length) * gain(&picture, [x, y, tx, ty], length);
             Some([by * nx, by * ny])
         };
         if drawn.solid.revolution().is_some() {
@@ -71,6 +106,13 @@ impl Picture<'_> {
             (true, false) => Some([-ty, tx]),
             _ => None,
         }
+    }
+
+    /// The value of the pixel at a position.
+    fn at(&self, values: &[f64], x: f64, y: f64) -> f64 {
+        let (w, h) = (self.width as usize, self.height as usize);
+        let (i, j) = ((x.max(0.0) as usize).min(w - 1), (y.max(0.0) as usize).min(h - 1));
+        values.get(j * w + i).copied().unwrap_or(0.0)
     }
 
     /// The value interpolated bilinearly between pixel centres.
@@ -161,6 +203,54 @@ mod tests {
                 // chance, each worth about 1 to 3, over a difference of 0.08.
                 assert!(
                     (along - slope).abs() < 0.03 * gross + 400.0,
+                    "number {k}: {along} {slope} of {gross}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn sums_of_fractions_have_these_slopes() {
+        const SIZE: u32 = 40;
+        // As of a mask: gains within it, losses elsewhere.
+        let gain: Vec<f64> = (0..SIZE * SIZE)
+            .map(|i| {
+                let (x, y) = (f64::from(i % SIZE), f64::from(i / SIZE));
+                let within = (x - 21.0).abs() < 7.0 && (y - 20.0).abs() < 9.0;
+                if within { 0.5 } else { -0.6 }
+            })
+            .collect();
+        let block = cuboid(Vec3::new(1.4, 1.0, 0.8));
+        for solid in [sphere(96, 48), block] {
+            let at = |p: &[f64; 5]| {
+                let turn = DVec3::new(0.4 + p[2], 0.5 + p[3], 0.2);
+                let by = Affine::new(DVec3::new(p[0], p[1], 0.0), turn, DVec3::splat(1.0 + p[4]));
+                View::new(solid.placed(by), Camera::default_for(SIZE, SIZE))
+            };
+            let sum = |p: &[f64; 5]| {
+                let fractions = at(p).fractions(SIZE);
+                fractions.iter().zip(&gain).map(|(f, g)| f64::from(*f) * g).sum::<f64>()
+            };
+            let here = [0.05, -0.1, 0.0, 0.0, 0.0];
+            let found = at(&here).vjp_fractions(SIZE, &gain);
+            let vertices = |p: &[f64; 5]| at(p).solid().vertices().collect::<Vec<_>>();
+            for k in 0..5 {
+                let moved = |h: f64| {
+                    let mut p = here;
+                    p[k] += h;
+                    p
+                };
+                let way = vertices(&moved(1e-6))
+                    .into_iter()
+                    .zip(vertices(&moved(-1e-6)))
+                    .map(|(a, b)| (a - b) / 2e-6);
+                let terms: Vec<f64> = found.iter().zip(way).map(|(g, d)| g.dot(d)).collect();
+                let (along, gross) =
+                    (terms.iter().sum::<f64>(), terms.iter().map(|t| t.abs()).sum::<f64>());
+                let slope = (sum(&moved(0.003)) - sum(&moved(-0.003))) / 0.006;
+                // The outline moves by about 0.03 pixels: 8 steps of the fractions.
+                assert!(
+                    (along - slope).abs() < 0.03 * gross + 3.0,
                     "number {k}: {along} {slope} of {gross}"
                 );
             }

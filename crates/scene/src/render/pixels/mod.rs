@@ -3,6 +3,7 @@
 pub(in crate::render) mod area;
 pub(in crate::render) mod candidates;
 pub(in crate::render) mod coverage;
+pub(in crate::render) mod fractions;
 pub(in crate::render) mod frame;
 pub(in crate::render) mod pixel_bitmap;
 pub(in crate::render) mod place;

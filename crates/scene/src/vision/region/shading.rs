@@ -32,10 +32,17 @@ pub(super) fn log_brightness(picture: &LinearImage) -> Vec<f32> {
     picture.rgb.iter().map(log).collect()
 }
 
-/// The terms of a normal.
+/// The variables of each pixel of a run, from whether it counts, its normal and its
+/// brightness: the constant, the terms, brightness.
 #[inline(always)]
-fn terms([x, y, z]: [f64; 3]) -> [f64; TERMS] {
-    [x, y, z, x * y, x * z, y * z, x * x - y * y]
+fn columns(
+    one: [f64; RUN],
+    [x, y, z]: [[f64; RUN]; 3],
+    brightness: [f64; RUN],
+) -> [[f64; RUN]; ALL] {
+    let product = |a: &[f64; RUN], b: &[f64; RUN]| std::array::from_fn(|i| a[i] * b[i]);
+    let difference = std::array::from_fn(|i| x[i] * x[i] - y[i] * y[i]);
+    [one, x, y, z, product(&x, &y), product(&x, &z), product(&y, &z), difference, brightness]
 }
 
 /// Returns the log ratio of the marginal likelihoods of the brightness of the pixels
@@ -103,14 +110,11 @@ fn products(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32]) -> Products
                 numbers[3][place] = *b;
                 count += usize::from(*g > 0 && (n[0] + n[1] + n[2] + b).is_finite());
             }
-            let mut columns = [[0.0; RUN]; ALL];
-            for i in 0..RUN {
-                let there = |number: f32| if i < count { f64::from(number) } else { 0.0 };
-                columns[0][i] = there(1.0);
-                let terms = terms([numbers[0][i], numbers[1][i], numbers[2][i]].map(there));
-                columns[1..=TERMS].iter_mut().zip(terms).for_each(|(column, t)| column[i] = t);
-                columns[ALL - 1][i] = there(numbers[3][i]);
-            }
+            let there = |list: &[f32; RUN]| -> [f64; RUN] {
+                std::array::from_fn(|i| if i < count { f64::from(list[i]) } else { 0.0 })
+            };
+            let [x, y, z, brightness] = numbers.each_ref().map(there);
+            let columns: [[f64; RUN]; ALL] = columns(there(&[1.0; RUN]), [x, y, z], brightness);
             let filled = count.div_ceil(LANES);
             for i in 0..ALL {
                 for j in i..ALL {
@@ -264,6 +268,7 @@ mod tests {
             (1..n).map(of).collect()
         };
         let y = contrast(&brightness.iter().map(|b| f64::from(*b)).collect::<Vec<_>>());
+        let terms = |[x, y, z]: [f64; 3]| [x, y, z, x * y, x * z, y * z, x * x - y * y];
         let rows: Vec<[f64; TERMS]> = normals.iter().map(|n| terms(n.map(f64::from))).collect();
         let x: Vec<Vec<f64>> =
             (0..TERMS).map(|t| contrast(&rows.iter().map(|r| r[t]).collect::<Vec<_>>())).collect();
