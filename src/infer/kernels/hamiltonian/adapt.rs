@@ -1,6 +1,8 @@
 //! Warm-up of Hamiltonian kernels: dual averaging of the step size (Hoffman & Gelman
-//! 2014, section 3.2), and a diagonal metric from the variances over windows that double
-//! in length, as in Stan.
+//! 2014, section 3.2), and a diagonal metric from windows that double in length, as in
+//! Stan. The metric is the geometric mean of the variances of the states and the inverse
+//! variances of the forces there, which minimises the Fisher divergence among diagonal
+//! ones (Seyboldt, Carlson & Carpenter 2026), as in nutpie.
 
 use super::point::Point;
 use super::system::System;
@@ -24,6 +26,10 @@ const LONGEST: f64 = 10.0;
 const DOUBLINGS: u32 = 40;
 const HALVINGS: u32 = 400;
 
+/// The largest inverse mass; the smallest is one over it. Squares of momenta and of velocities
+/// then are finite.
+const LIGHTEST: f64 = 1e140;
+
 /// The number of initial states that are excluded from the variances, and the length of
 /// the first window.
 const BURN: u32 = 30;
@@ -36,7 +42,7 @@ pub(super) struct Adaptation {
     /// What the metric belongs to: addresses and their numbers of coordinates.
     signature: Vec<(u64, usize)>,
     pub inverse_mass: Vec<f64>,
-    /// By address, the variances from the last windows. Choices that disappear and
+    /// By address, the inverse masses from the last windows. Choices that disappear and
     /// reappear get theirs again, so that after warm-up the metric is a function of the
     /// set of choices.
     learnt: BTreeMap<u64, Vec<f64>>,
@@ -50,9 +56,9 @@ pub(super) struct Adaptation {
     seen: u32,
     window_end: u32,
     window: u32,
-    /// The states of this window, by address; choices that disappear and reappear
-    /// continue to be counted.
-    states: BTreeMap<u64, Moments>,
+    /// The states of this window and the forces there, by address; choices that disappear
+    /// and reappear continue to be counted.
+    states: BTreeMap<u64, [Moments; 2]>,
 }
 
 /// Means and sums of squares of a choice's coordinates (Welford 1962).
@@ -76,13 +82,23 @@ impl Moments {
         }
     }
 
-    /// The variances, shrunk towards a small value if there are few states, as in Stan;
-    /// `None` for fewer than two states.
-    fn variances(&self) -> Option<Vec<f64>> {
-        let n = self.count;
-        let variance = |s: &f64| (n / (n + 5.0)) * (s / (n - 1.0)) + 1e-3 * 5.0 / (n + 5.0);
-        (n >= 2.0).then(|| self.square.iter().map(variance).collect())
+    /// The variances, if there are enough states.
+    fn variances(&self) -> Option<impl Iterator<Item = f64>> {
+        (self.count >= 3.0).then(|| self.square.iter().map(|s| s / (self.count - 1.0)))
     }
+}
+
+/// The inverse masses for these states and the forces there; `None` for too few states. Where
+/// the forces do not vary, the states alone count; where the states do not vary either, for
+/// instance since every transition was rejected, nothing is learnt and the mass stays.
+fn inverse_masses([states, forces]: &[Moments; 2], before: Option<&Vec<f64>>) -> Option<Vec<f64>> {
+    let one = |(i, (y, g)): (usize, (f64, f64))| {
+        let known = |m: &f64| m.is_finite() && *m > 0.0;
+        let found = [(y / g).sqrt(), y].into_iter().find(known);
+        let before = || before.and_then(|b| b.get(i)).copied().unwrap_or(1.0);
+        found.map_or_else(before, |m| m.clamp(LIGHTEST.recip(), LIGHTEST))
+    };
+    Some(states.variances()?.zip(forces.variances()?).enumerate().map(one).collect())
 }
 
 impl Adaptation {
@@ -112,7 +128,7 @@ impl Adaptation {
     pub fn take_up(&mut self, read: Adaptation) -> Result<(), StateError> {
         let n = read.inverse_mass.len();
         let sizes = read.signature.iter().try_fold(0usize, |sum, s| sum.checked_add(s.1));
-        let whole = |m: &Moments| m.mean.len() == m.square.len();
+        let whole = |ms: &[Moments; 2]| ms.iter().all(|m| m.mean.len() == m.square.len());
         holds(sizes == Some(n) && read.states.values().all(whole), "a step size and metric")?;
         *self = Adaptation { target: self.target, fixed: self.fixed, ..read };
         Ok(())
@@ -148,7 +164,7 @@ impl Adaptation {
     }
 
     /// Adapts to a transition: its mean acceptance probability and its end point.
-    pub fn learn(&mut self, acceptance: f64, y: &[f64]) {
+    pub fn learn(&mut self, acceptance: f64, end: &Point) {
         self.rounds += 1.0;
         let weight = 1.0 / (self.rounds + T0);
         let off = self.target - if acceptance.is_nan() { 0.0 } else { acceptance.min(1.0) };
@@ -165,35 +181,46 @@ impl Adaptation {
         };
         self.seen = self.seen.saturating_add(1);
         if self.seen > BURN {
-            let mut rest = y;
+            let mut from = 0;
             for (hash, n) in &self.signature {
-                let (own, others) = rest.split_at((*n).min(rest.len()));
-                self.states.entry(*hash).or_default().add(own);
-                rest = others;
+                let own = from..from + n;
+                let lists = [&end.y, &end.gradient].map(|list| list.get(own.clone()));
+                let moments = self.states.entry(*hash).or_default();
+                moments.iter_mut().zip(lists).for_each(|(m, list)| m.add(list.unwrap_or(&[])));
+                from = own.end;
             }
         }
         if self.seen == self.window_end {
-            self.close();
+            let log_longer = self.close();
             self.window = self.window.saturating_mul(2);
             self.window_end = self.seen.saturating_add(self.window);
-            // The step size is adapted again for the new metric, starting from its
-            // present value.
-            self.mean_log = libm::log(10.0 * self.averaged);
-            (self.bias, self.rounds) = (0.0, 0.0);
-            self.step = self.averaged;
+            // The step size is searched for again at the next transition, since the new
+            // metric may differ from the last by tens of orders of magnitude.
+            let log_step = libm::log(self.averaged.max(f64::MIN_POSITIVE)) + log_longer;
+            self.averaged = libm::exp(log_step.clamp(SHORTEST, LONGEST));
+            (self.bias, self.rounds, self.step) = (0.0, 0.0, 0.0);
         }
     }
 
-    /// Ends a window: its variances become the metric of the choices that it saw at least
-    /// twice.
-    fn close(&mut self) {
-        let seen = std::mem::take(&mut self.states);
-        self.learnt.extend(seen.into_iter().filter_map(|(hash, m)| Some((hash, m.variances()?))));
-        self.inverse_mass = self.metric();
+    /// Ends a window: it gives the metric of the choices that it saw often enough. Returns
+    /// the log of the factor by which a step has to grow to stay as long as it was, in the
+    /// geometric mean over all coordinates.
+    fn close(&mut self) -> f64 {
+        for (hash, moments) in std::mem::take(&mut self.states) {
+            let before = self.learnt.get(&hash);
+            if let Some(masses) = inverse_masses(&moments, before) {
+                self.learnt.insert(hash, masses);
+            }
+        }
+        let metric = self.metric();
+        let before = std::mem::replace(&mut self.inverse_mass, metric);
+        let pairs = before.iter().zip(&self.inverse_mass);
+        let sum: f64 = pairs.map(|(old, new)| 0.5 * (libm::log(*old) - libm::log(*new))).sum();
+        sum / before.len().max(1) as f64
     }
 
-    /// The inverse masses of the present choices: the variances of previous windows, or 1
-    /// for those without.
+    /// The inverse masses of the present choices: those of previous windows, or 1 for
+    /// choices without.
     fn metric(&self) -> Vec<f64> {
         let known =
             |(hash, n): &(u64, usize)| self.learnt.get(hash).filter(|m| m.len() == *n).cloned();
