@@ -9,7 +9,7 @@
 
 use super::build::Builder;
 use super::log_sum_exp::{LogSumExp, Term, Terms};
-use super::op::Op;
+use super::op::{Op, runs};
 use super::summed::Summed;
 use crate::num::Column;
 use smallvec::SmallVec;
@@ -132,7 +132,7 @@ impl Builder {
             let sums = sums.into_iter().map(|s| (s, 0)).collect();
             self.summed.push(Summed { choice: x, given, sums });
         }
-        self.ops.push(Op::Total { from: roots.into() });
+        self.ops.push(Op::Total { from: runs(roots.into_iter()) });
         Some(terms)
     }
 
