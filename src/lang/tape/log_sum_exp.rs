@@ -27,7 +27,8 @@ impl Term {
             let tempered = |x: f64| if x == f64::NEG_INFINITY { x } else { x * power };
             row.iter_mut().enumerate().for_each(|(i, r)| *r += tempered(v[at + i * step]));
         } else if step == 0 {
-            row.iter_mut().for_each(|r| *r += v[at]);
+            let x = v[at];
+            row.iter_mut().for_each(|r| *r += x);
         } else {
             row.iter_mut().zip(&v[at..]).for_each(|(r, x)| *r += x);
         }

@@ -60,10 +60,10 @@ impl OneNumber {
         }
     }
 
-    /// See [`holds`].
-    fn holds(&self, graph: &Graph, values: &[usize]) -> bool {
-        (self.choice == NONE || values.get(self.choice as usize) == Some(&(self.value as usize)))
-            && graph.nodes[self.node as usize].state == State::Clean
+    /// Whether the choice has this value.
+    #[inline]
+    fn applies(&self, values: &[usize]) -> bool {
+        self.choice == NONE || values.get(self.choice as usize) == Some(&(self.value as usize))
     }
 }
 
@@ -153,10 +153,10 @@ impl InPlace {
             }
         }
         let one = |s: &OneNumber| {
-            !s.holds(graph, values) || {
-                let node = &graph.nodes[s.node as usize];
-                takes_one(graph.op(code, s.node), node.side.as_deref())
-            }
+            let node = &graph.nodes[s.node as usize];
+            !s.applies(values)
+                || node.state != State::Clean
+                || takes_one(graph.op(code, s.node), node.side.as_deref())
         };
         self.number_scores.iter().all(one)
             && self.scores.iter().filter(|(given, n, _)| holds(graph, given, *n, values)).all(
@@ -186,8 +186,13 @@ impl InPlace {
         before: Option<&ScoreSums>,
     ) {
         for v in &self.number_values {
-            if v.holds(graph, values) {
-                graph.nodes[v.node as usize].value = Value::Num(tape.number(v.at as usize));
+            let node = &mut graph.nodes[v.node as usize];
+            if v.applies(values) && node.state == State::Clean {
+                let now = tape.number(v.at as usize);
+                match &mut node.value {
+                    Value::Num(x) => *x = now,
+                    other => *other = Value::Num(now),
+                }
             }
         }
         let mut made = self.made.drain(..);
@@ -272,12 +277,12 @@ impl InPlace {
     ) {
         self.old.iter_mut().chain(&mut self.new).for_each(Vec::clear);
         for s in &self.number_scores {
-            if !s.holds(graph, values) {
+            let node = &mut graph.nodes[s.node as usize];
+            if !s.applies(values) || node.state != State::Clean {
                 continue;
             }
             let score = tape.number(s.at as usize);
-            let likelihood = usize::from(!matches!(graph.op(code, s.node), Op::Draw { .. }));
-            let node = &mut graph.nodes[s.node as usize];
+            let likelihood = usize::from(!matches!(code.ops[node.op as usize], Op::Draw { .. }));
             match node.side.as_deref_mut() {
                 Some(Side::Total(t)) => {
                     if node.score == 0.0 {
@@ -293,8 +298,8 @@ impl InPlace {
             node.score = score;
         }
         for (sums, terms) in [(old, &self.old), (new, &self.new)] {
-            sums.prior.add_each(terms[0].iter().copied());
-            sums.likelihood.add_each(terms[1].iter().copied());
+            sums.prior.add_all(&terms[0]);
+            sums.likelihood.add_all(&terms[1]);
         }
     }
 }

@@ -228,7 +228,7 @@ impl Batch for Normals {
     ) -> bool {
         let there = self.compute(buffer, x, params, n);
         if there {
-            sum.add_each(self.terms.iter().copied());
+            sum.add_all(&self.terms);
         }
         there
     }
