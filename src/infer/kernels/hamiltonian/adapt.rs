@@ -1,8 +1,8 @@
 //! Warm-up of Hamiltonian kernels: dual averaging of the step size (Hoffman & Gelman
-//! 2014, section 3.2), and a diagonal metric from windows that double in length, as in
-//! Stan. The metric is the geometric mean of the variances of the states and the inverse
-//! variances of the forces there, which minimises the Fisher divergence among diagonal
-//! ones (Seyboldt, Carlson & Carpenter 2026), as in nutpie.
+//! 2014, section 3.2), and a diagonal metric from the variances over windows that double
+//! in length, as in Stan. Other than in Stan, the variances are not shrunk towards 1e-3,
+//! which is no small value where a scale is smaller; and other than in nutpie, forces do
+//! not count (docs/measurements/speed.md says what both cost).
 
 use super::point::Point;
 use super::system::System;
@@ -56,9 +56,9 @@ pub(super) struct Adaptation {
     seen: u32,
     window_end: u32,
     window: u32,
-    /// The states of this window and the forces there, by address; choices that disappear
-    /// and reappear continue to be counted.
-    states: BTreeMap<u64, [Moments; 2]>,
+    /// The states of this window, by address; choices that disappear and reappear
+    /// continue to be counted.
+    states: BTreeMap<u64, Moments>,
 }
 
 /// Means and sums of squares of a choice's coordinates (Welford 1962).
@@ -82,23 +82,18 @@ impl Moments {
         }
     }
 
-    /// The variances, if there are enough states.
-    fn variances(&self) -> Option<impl Iterator<Item = f64>> {
-        (self.count >= 3.0).then(|| self.square.iter().map(|s| s / (self.count - 1.0)))
+    /// The variances, which are the inverse masses; `None` for too few states. Where the
+    /// states do not vary, for instance since every transition was rejected, nothing is
+    /// learnt and what was known `before` stays.
+    fn variances(&self, before: Option<&Vec<f64>>) -> Option<Vec<f64>> {
+        let one = |(i, s): (usize, &f64)| {
+            let found = s / (self.count - 1.0);
+            let before = || before.and_then(|b| b.get(i)).copied().unwrap_or(1.0);
+            let known = found.is_finite() && found > 0.0;
+            if known { found.clamp(LIGHTEST.recip(), LIGHTEST) } else { before() }
+        };
+        (self.count >= 3.0).then(|| self.square.iter().enumerate().map(one).collect())
     }
-}
-
-/// The inverse masses for these states and the forces there; `None` for too few states. Where
-/// the forces do not vary, the states alone count; where the states do not vary either, for
-/// instance since every transition was rejected, nothing is learnt and the mass stays.
-fn inverse_masses([states, forces]: &[Moments; 2], before: Option<&Vec<f64>>) -> Option<Vec<f64>> {
-    let one = |(i, (y, g)): (usize, (f64, f64))| {
-        let known = |m: &f64| m.is_finite() && *m > 0.0;
-        let found = [(y / g).sqrt(), y].into_iter().find(known);
-        let before = || before.and_then(|b| b.get(i)).copied().unwrap_or(1.0);
-        found.map_or_else(before, |m| m.clamp(LIGHTEST.recip(), LIGHTEST))
-    };
-    Some(states.variances()?.zip(forces.variances()?).enumerate().map(one).collect())
 }
 
 impl Adaptation {
@@ -128,7 +123,7 @@ impl Adaptation {
     pub fn take_up(&mut self, read: Adaptation) -> Result<(), StateError> {
         let n = read.inverse_mass.len();
         let sizes = read.signature.iter().try_fold(0usize, |sum, s| sum.checked_add(s.1));
-        let whole = |ms: &[Moments; 2]| ms.iter().all(|m| m.mean.len() == m.square.len());
+        let whole = |m: &Moments| m.mean.len() == m.square.len();
         holds(sizes == Some(n) && read.states.values().all(whole), "a step size and metric")?;
         *self = Adaptation { target: self.target, fixed: self.fixed, ..read };
         Ok(())
@@ -164,7 +159,7 @@ impl Adaptation {
     }
 
     /// Adapts to a transition: its mean acceptance probability and its end point.
-    pub fn learn(&mut self, acceptance: f64, end: &Point) {
+    pub fn learn(&mut self, acceptance: f64, y: &[f64]) {
         self.rounds += 1.0;
         let weight = 1.0 / (self.rounds + T0);
         let off = self.target - if acceptance.is_nan() { 0.0 } else { acceptance.min(1.0) };
@@ -181,13 +176,11 @@ impl Adaptation {
         };
         self.seen = self.seen.saturating_add(1);
         if self.seen > BURN {
-            let mut from = 0;
+            let mut rest = y;
             for (hash, n) in &self.signature {
-                let own = from..from + n;
-                let lists = [&end.y, &end.gradient].map(|list| list.get(own.clone()));
-                let moments = self.states.entry(*hash).or_default();
-                moments.iter_mut().zip(lists).for_each(|(m, list)| m.add(list.unwrap_or(&[])));
-                from = own.end;
+                let (own, others) = rest.split_at((*n).min(rest.len()));
+                self.states.entry(*hash).or_default().add(own);
+                rest = others;
             }
         }
         if self.seen == self.window_end {
@@ -208,7 +201,7 @@ impl Adaptation {
     fn close(&mut self) -> f64 {
         for (hash, moments) in std::mem::take(&mut self.states) {
             let before = self.learnt.get(&hash);
-            if let Some(masses) = inverse_masses(&moments, before) {
+            if let Some(masses) = moments.variances(before) {
                 self.learnt.insert(hash, masses);
             }
         }
@@ -261,5 +254,50 @@ impl Adaptation {
         self.mean_log = libm::log(10.0 * step);
         (self.bias, self.rounds) = (0.0, 0.0);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn variances(states: &[f64], before: Option<&Vec<f64>>) -> Option<Vec<f64>> {
+        let mut moments = Moments::default();
+        states.iter().for_each(|y| moments.add(&[*y]));
+        moments.variances(before)
+    }
+
+    #[test]
+    fn variances_are_those_of_states_of_any_scale() {
+        for scale in [1e-40, 1e-3, 1.0, 1e30] {
+            let states = [1.0, 2.0, 3.0, 4.0].map(|z| z * scale);
+            let found = variances(&states, None).unwrap()[0] / scale / scale;
+            assert!((found - 5.0 / 3.0).abs() < 1e-9, "{scale}: {found}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_learnt_from_few_states_or_from_one_that_stays() {
+        assert_eq!(variances(&[1.0, 2.0], None), None);
+        assert_eq!(variances(&[1.0; 9], Some(&vec![5.0])), Some(vec![5.0]));
+        assert_eq!(variances(&[1.0; 9], None), Some(vec![1.0]));
+        assert_eq!(variances(&[1e300, -1e300, 0.0], None), Some(vec![1.0]));
+    }
+
+    #[test]
+    fn a_step_stays_as_long_as_it_was_when_the_metric_changes() {
+        let mut adaptation = Adaptation::new(0.8, None);
+        adaptation.signature = vec![(7, 1)];
+        adaptation.inverse_mass = vec![1.0];
+        adaptation.step = 1e-30;
+        adaptation.averaged = 1e-30;
+        adaptation.mean_log = libm::log(1e-30);
+        for i in 0..BURN + WINDOW {
+            adaptation.learn(0.8, &[1e-30 * f64::from(i % 5)]);
+        }
+        // It is to be searched for, from about where it was.
+        assert_eq!(adaptation.step, 0.0);
+        let length = adaptation.averaged * adaptation.inverse_mass[0].sqrt();
+        assert!((length / 1e-30 - 1.0).abs() < 1e-6, "{length}");
     }
 }

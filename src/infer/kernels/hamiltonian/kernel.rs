@@ -133,8 +133,8 @@ impl<T: Trajectory> Hamiltonian<T> {
         let end = trajectory.walk(&mut path)?;
         let moved = system.finish_at(end.to.as_deref())?;
         if at.adapting {
-            let at = end.to.as_ref().filter(|_| moved).unwrap_or(&here);
-            adaptation.learn(end.acceptance, at);
+            let y = end.to.as_ref().filter(|_| moved).map_or(&here.y, |to| &to.y);
+            adaptation.learn(end.acceptance, y);
         }
         Ok(Outcome {
             failed: u32::from(end.failed),
