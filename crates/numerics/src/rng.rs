@@ -148,15 +148,25 @@ impl Stream {
     /// weights are 0.
     #[inline]
     pub fn weighted(&mut self, weights: &[f64], total: f64) -> usize {
-        let (mut u, mut last) = (self.uniform() * total, weights.len().saturating_sub(1));
-        for (i, w) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
-            last = i;
-            if u < *w {
-                break;
+        self.weighted_by(weights.iter().copied(), total)
+    }
+
+    /// [`Stream::weighted`] with weights that are in no slice.
+    #[inline]
+    pub fn weighted_by(&mut self, weights: impl Iterator<Item = f64>, total: f64) -> usize {
+        // Without a positive weight it is the last one.
+        let (mut u, mut last, mut n, mut any) = (self.uniform() * total, 0, 0, false);
+        for (i, w) in weights.enumerate() {
+            n = i;
+            if w > 0.0 {
+                (last, any) = (i, true);
+                if u < w {
+                    break;
+                }
+                u -= w;
             }
-            u -= w;
         }
-        last
+        if any { last } else { n }
     }
 
     /// Samples from one of `rand_distr`'s distributions.

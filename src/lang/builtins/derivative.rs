@@ -6,6 +6,7 @@ use super::elementwise::{array_len, part};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::value::Value;
 use crate::num::Column;
+use crate::num::simd::{sum_of_triples, vectorised_if_many};
 use smallvec::{SmallVec, smallvec};
 
 impl Derivative {
@@ -60,26 +61,47 @@ pub(super) fn each_pair(
 ) {
     let (before, z) = v.split_at_mut(out);
     let z = &mut z[..n];
-    match (x.step, y.step) {
-        (0, 0) => z.fill(f(before[x.at], before[y.at])),
-        (0, _) => {
-            let x = before[x.at];
-            z.iter_mut().zip(&before[y.at..y.at + n]).for_each(|(z, y)| *z = f(x, *y));
-        }
-        (_, 0) => {
-            let y = before[y.at];
-            z.iter_mut().zip(&before[x.at..x.at + n]).for_each(|(z, x)| *z = f(*x, y));
-        }
-        _ => {
-            let both = before[x.at..x.at + n].iter().zip(&before[y.at..y.at + n]);
-            z.iter_mut().zip(both).for_each(|(z, (x, y))| *z = f(*x, *y));
-        }
-    }
+    vectorised_if_many(
+        n,
+        #[inline(always)]
+        || match (x.step, y.step) {
+            (0, 0) => z.fill(f(before[x.at], before[y.at])),
+            (0, _) => {
+                let x = before[x.at];
+                z.iter_mut().zip(&before[y.at..y.at + n]).for_each(|(z, y)| *z = f(x, *y));
+            }
+            (_, 0) => {
+                let y = before[y.at];
+                z.iter_mut().zip(&before[x.at..x.at + n]).for_each(|(z, x)| *z = f(*x, y));
+            }
+            _ => {
+                let both = before[x.at..x.at + n].iter().zip(&before[y.at..y.at + n]);
+                z.iter_mut().zip(both).for_each(|(z, (x, y))| *z = f(*x, *y));
+            }
+        },
+    );
 }
 
 /// Adds to the adjoints of both columns, if they are live.
 #[inline(always)]
 pub(super) fn vjp_pairs(
+    v: &[f64],
+    g: &mut [f64],
+    x: Column,
+    y: Column,
+    out: usize,
+    n: usize,
+    slopes: impl Fn(f64, f64, f64) -> [f64; 2],
+) {
+    vectorised_if_many(
+        n,
+        #[inline(always)]
+        || vjp_pairs_here(v, g, x, y, out, n, slopes),
+    );
+}
+
+#[inline(always)]
+fn vjp_pairs_here(
     v: &[f64],
     g: &mut [f64],
     x: Column,
@@ -101,15 +123,13 @@ pub(super) fn vjp_pairs(
         let (xs, ys) = (&v[x.at..end(x)], &v[y.at..end(y)]);
         match (into, xs, ys) {
             ([into], [x], [y]) => {
-                *into += by.iter().zip(z).fold(0.0, |sum, (b, z)| sum + one(*b, *x, *y, *z));
+                *into += sum_of_triples(by, z, z, |b, z, _| one(b, *x, *y, z));
             }
             ([into], xs, [y]) if c.step == 0 => {
-                let all = by.iter().zip(z).zip(xs);
-                *into += all.fold(0.0, |sum, ((b, z), x)| sum + one(*b, *x, *y, *z));
+                *into += sum_of_triples(by, z, xs, |b, z, x| one(b, x, *y, z));
             }
             ([into], [x], ys) if c.step == 0 => {
-                let all = by.iter().zip(z).zip(ys);
-                *into += all.fold(0.0, |sum, ((b, z), y)| sum + one(*b, *x, *y, *z));
+                *into += sum_of_triples(by, z, ys, |b, z, y| one(b, *x, y, z));
             }
             (into, [x], ys) => {
                 let all = into.iter_mut().zip(by.iter().zip(z).zip(ys));

@@ -7,8 +7,8 @@
 //! so that what reads them in the same order finds an array.
 
 use super::form::Form;
-use super::log_sum_exp::{LogSumExp, Term};
-use super::op::{Op, Scored};
+use super::log_sum_exp::{LogSumExp, Term, Terms};
+use super::op::{Op, Scored, runs};
 use super::{Tape, summed};
 use crate::dist::{Batch, Dist, Product, batch};
 use crate::num::Column;
@@ -115,7 +115,7 @@ fn each_run(op: &Op, f: &mut dyn FnMut(usize, usize, bool)) {
             l.values.iter().flatten().for_each(|t| column(&t.column, l.n, f));
             f(l.out, l.n, true);
         }
-        Op::Total { from } => from.iter().for_each(|at| f(*at, 1, false)),
+        Op::Total { from } => from.iter().for_each(|run| f(run.start, run.len(), false)),
     }
 }
 
@@ -224,11 +224,29 @@ pub(super) fn merge(tape: &mut Tape) {
 /// each short run costs more.
 const GAP: usize = 128;
 
+/// Returns the columns that an operation reads and adds no derivatives to.
+fn given_columns(op: &Op) -> impl Iterator<Item = &Column> {
+    let (pair, params, values): (_, &[Column], &[Terms]) = match op {
+        Op::Binary { x, y, .. } => ([Some(x), Some(y)], &[], &[]),
+        Op::Density { x, params, .. } => ([Some(x), None], params, &[]),
+        Op::LogSumExp(l) => ([None; 2], &[], &l.values),
+        _ => ([None; 2], &[], &[]),
+    };
+    let terms = values.iter().flatten().map(|t| &t.column);
+    pair.into_iter().flatten().chain(params).chain(terms).filter(|c| !c.live)
+}
+
 /// Returns the runs of numbers whose adjoints are used, and of few others.
 fn used(tape: &Tape) -> Vec<Range<usize>> {
     let mut is_used = vec![false; tape.values.numbers.len()];
     for op in &tape.ops {
-        each_run(op, &mut |at, n, _| is_used[at..at + n].fill(true));
+        // Nothing is added to the adjoints of numbers that are given, like data.
+        let given: SmallVec<[usize; 8]> = given_columns(op).map(|c| c.at).collect();
+        each_run(op, &mut |at, n, written| {
+            if written || !given.contains(&at) {
+                is_used[at..at + n].fill(true);
+            }
+        });
     }
     tape.inputs.iter().for_each(|i| i.form.each_place(&mut |at| is_used[at] = true));
     let mut runs: Vec<Range<usize>> = Vec::new();
@@ -294,7 +312,8 @@ impl Merger<'_> {
         }
         let to = |at: &mut usize| *at = self.moved.get(at).copied().unwrap_or(*at);
         if let Op::Total { from } = op {
-            from.iter_mut().for_each(to);
+            let places = from.iter().flat_map(Range::clone);
+            *from = runs(places.map(|at| self.moved.get(&at).copied().unwrap_or(at)));
         }
         if arguments(op).is_none() {
             return;

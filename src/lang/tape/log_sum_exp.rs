@@ -2,6 +2,7 @@
 //! that depend on it, and the log of the sum of their exponentials.
 
 use crate::num::Column;
+use crate::num::simd::{sum_of_triples, vectorised_if_many};
 use crate::num::wide::log_sum_exp_rows;
 use smallvec::SmallVec;
 
@@ -18,6 +19,7 @@ pub(super) struct Term {
 
 impl Term {
     /// Adds these scores to a row.
+    #[inline(always)]
     fn add(&self, v: &[f64], power: f64, row: &mut [f64]) {
         let Column { at, step, .. } = self.column;
         if self.observed && power != 1.0 {
@@ -25,7 +27,8 @@ impl Term {
             let tempered = |x: f64| if x == f64::NEG_INFINITY { x } else { x * power };
             row.iter_mut().enumerate().for_each(|(i, r)| *r += tempered(v[at + i * step]));
         } else if step == 0 {
-            row.iter_mut().for_each(|r| *r += v[at]);
+            let x = v[at];
+            row.iter_mut().for_each(|r| *r += x);
         } else {
             row.iter_mut().zip(&v[at..]).for_each(|(r, x)| *r += x);
         }
@@ -50,25 +53,42 @@ impl LogSumExp {
         let n = self.n;
         self.shares.resize(self.values.len() * n, 0.0);
         let (before, out) = v.split_at_mut(self.out);
-        for (terms, row) in self.values.iter().zip(self.shares.chunks_exact_mut(n.max(1))) {
-            row.fill(0.0);
-            terms.iter().for_each(|t| t.add(before, power, row));
-        }
+        vectorised_if_many(
+            n,
+            #[inline(always)]
+            || {
+                let rows = self.shares.chunks_exact_mut(n.max(1));
+                for (terms, row) in self.values.iter().zip(rows) {
+                    row.fill(0.0);
+                    terms.iter().for_each(|t| t.add(before, power, row));
+                }
+            },
+        );
         log_sum_exp_rows(&mut self.shares, &mut out[..n])
     }
 
     /// Adds the adjoints of the terms: those of the results, times the conditional
     /// probabilities of the values.
     pub fn reverse(&self, g: &mut [f64], power: f64) {
+        vectorised_if_many(
+            self.n,
+            #[inline(always)]
+            || self.reverse_here(g, power),
+        );
+    }
+
+    #[inline(always)]
+    fn reverse_here(&self, g: &mut [f64], power: f64) {
         let (before, by) = g.split_at_mut(self.out);
         for (terms, row) in self.values.iter().zip(self.shares.chunks_exact(self.n.max(1))) {
             for t in terms.iter().filter(|t| t.column.live) {
                 let scale = if t.observed { power } else { 1.0 };
                 let at = t.column.at;
-                let parts = row.iter().zip(&by[..self.n]).map(|(s, b)| scale * (s * b));
+                let by = &by[..self.n];
                 if t.column.step == 0 {
-                    before[at] += parts.sum::<f64>();
+                    before[at] += sum_of_triples(row, by, by, |s, b, _| scale * (s * b));
                 } else {
+                    let parts = row.iter().zip(by).map(|(s, b)| scale * (s * b));
                     before[at..].iter_mut().zip(parts).for_each(|(g, p)| *g += p);
                 }
             }
@@ -76,7 +96,7 @@ impl LogSumExp {
     }
 
     /// Returns the conditional probabilities of the values of choice `i`.
-    pub fn conditional(&self, i: usize) -> SmallVec<[f64; 4]> {
-        self.shares.iter().skip(i).step_by(self.n.max(1)).copied().collect()
+    pub fn conditional(&self, i: usize) -> impl Iterator<Item = f64> {
+        self.shares.iter().skip(i).step_by(self.n.max(1)).copied()
     }
 }

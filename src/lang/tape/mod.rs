@@ -223,6 +223,12 @@ impl Tape {
         form.value(&self.values)
     }
 
+    /// Returns a number of the buffer at the last run.
+    #[inline]
+    pub fn number(&self, at: usize) -> f64 {
+        self.values.numbers[at]
+    }
+
     /// Returns the numbers of a form in the buffer at the last run; `None` for others.
     pub fn numbers(&self, form: &Form) -> Option<&[f64]> {
         match form {

@@ -8,6 +8,7 @@ use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Binary, Builtin, PreviousEvaluation, Reduction, times};
 use crate::lang::density;
 use crate::lang::value::Value;
+use crate::num::simd::{sum_of_triples, vectorised_if_many};
 use crate::num::{Column, ExactSum};
 use smallvec::SmallVec;
 use std::ops::Range;
@@ -100,8 +101,8 @@ pub(super) enum Op {
     Factor { x: usize },
     /// The log of a sum of exponentials of sums of terms.
     LogSumExp(LogSumExp),
-    /// Log densities from which choices are summed out.
-    Total { from: Box<[usize]> },
+    /// Log densities from which choices are summed out, in runs of consecutive places.
+    Total { from: Vec<Range<usize>> },
 }
 
 impl Op {
@@ -269,7 +270,7 @@ impl Op {
                 true
             }
             Op::Total { from } => {
-                from.iter().for_each(|at| g[*at] += 1.0);
+                from.iter().for_each(|run| g[run.clone()].iter_mut().for_each(|g| *g += 1.0));
                 true
             }
         }
@@ -324,12 +325,28 @@ impl ScoreSums {
 
 /// The sum of some numbers, in a fixed order. These are logs of sums, which are rounded
 /// themselves, so an exact sum would be no more accurate.
-fn sum(from: &[usize], v: &[f64]) -> f64 {
-    let mut lanes = [0.0; 8];
-    for some in from.chunks(lanes.len()) {
-        lanes.iter_mut().zip(some).for_each(|(lane, at)| *lane += v[*at]);
+fn sum(from: &[Range<usize>], v: &[f64]) -> f64 {
+    let of_run = |run: &Range<usize>| {
+        let xs = &v[run.clone()];
+        vectorised_if_many(
+            xs.len(),
+            #[inline(always)]
+            || sum_of_triples(xs, xs, xs, |x, _, _| x),
+        )
+    };
+    from.iter().map(of_run).sum()
+}
+
+/// Places in their order, as runs of consecutive ones.
+pub(super) fn runs(places: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for at in places {
+        match runs.last_mut() {
+            Some(run) if run.end == at => run.end = at + 1,
+            _ => runs.push(at..at + 1),
+        }
     }
-    lanes.iter().sum()
+    runs
 }
 
 /// Returns the log density of a value; `None` if it is undefined.

@@ -9,7 +9,7 @@
 
 use super::build::Builder;
 use super::log_sum_exp::{LogSumExp, Term, Terms};
-use super::op::Op;
+use super::op::{Op, runs};
 use super::summed::Summed;
 use crate::num::Column;
 use smallvec::SmallVec;
@@ -81,11 +81,17 @@ impl Builder {
             let tables = f.entries.into_iter().map(|e| self.terms_of(e)).collect();
             alive.push(Some((f.scope, tables)));
         }
-        // Those with the fewest neighbours first.
+        // Those with the fewest neighbours first; among equals in the order in which their
+        // factors were recorded, so that their sums read consecutive numbers.
+        let mut order: Vec<usize> = (0..counts.len()).collect();
+        order.sort_by_key(|x| of_choice[*x].first().copied());
+        let mut rank = vec![0; counts.len()];
+        order.iter().enumerate().for_each(|(i, x)| rank[*x] = i);
         let mut open: BTreeSet<(usize, usize)> =
-            near.iter().enumerate().map(|(x, n)| (n.len(), x)).collect();
+            near.iter().zip(&rank).map(|(n, rank)| (n.len(), *rank)).collect();
         let mut roots = Vec::new();
-        while let Some((_, x)) = open.pop_first() {
+        while let Some((_, first)) = open.pop_first() {
+            let x = order[first];
             let others: Vec<usize> = std::mem::take(&mut near[x]).into_iter().collect();
             let given: Vec<(usize, usize)> = others.iter().map(|y| (*y, counts[*y])).collect();
             let size = given.iter().try_fold(counts[x], |n, g| n.checked_mul(g.1))?;
@@ -112,10 +118,10 @@ impl Builder {
                 sums.push(self.log_sum_exp(values));
             }
             for y in &others {
-                open.remove(&(near[*y].len(), *y));
+                open.remove(&(near[*y].len(), rank[*y]));
                 near[*y].remove(&x);
                 near[*y].extend(others.iter().filter(|z| *z != y));
-                open.insert((near[*y].len(), *y));
+                open.insert((near[*y].len(), rank[*y]));
                 of_choice[*y].push(alive.len());
             }
             let live = |at: &usize| Term {
@@ -132,7 +138,7 @@ impl Builder {
             let sums = sums.into_iter().map(|s| (s, 0)).collect();
             self.summed.push(Summed { choice: x, given, sums });
         }
-        self.ops.push(Op::Total { from: roots.into() });
+        self.ops.push(Op::Total { from: runs(roots.into_iter()) });
         Some(terms)
     }
 

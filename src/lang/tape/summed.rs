@@ -39,7 +39,7 @@ pub(super) fn draw(summed: &[Summed], ops: &[Op], rng: &mut Stream) -> Vec<usize
         let joint = s.given.iter().rev().fold(0, |p, (y, n)| p * n + values[*y]);
         let Some((op, i)) = s.sums.get(joint).copied() else { continue };
         let Some(Op::LogSumExp(l)) = ops.get(op) else { continue };
-        values[s.choice] = rng.weighted(&l.conditional(i), 1.0);
+        values[s.choice] = rng.weighted_by(l.conditional(i), 1.0);
     }
     values
 }

@@ -27,9 +27,44 @@ pub(in crate::trace) struct InPlace {
     besides: Vec<(Given, NodeId, Besides)>,
     /// Nodes that contribute to the score, and where their terms are on the tape.
     scores: Vec<(Given, NodeId, Scored)>,
+    /// Those of the values, and of the scores, that are one number on the tape. Apart from
+    /// the others because there are thousands where choices are summed out of a loop.
+    number_values: Vec<OneNumber>,
+    number_scores: Vec<OneNumber>,
+    /// Terms of the prior and of the likelihood that change.
+    old: [Vec<f64>; 2],
+    new: [Vec<f64>; 2],
     each: Vec<f64>,
     made: Vec<Value>,
     columns: FxHashMap<usize, Vec<f64>>,
+}
+
+/// A node and the index of a number, for one value of a choice that is summed out ([`NONE`]
+/// if it depends on none).
+#[derive(Clone, Copy, Debug)]
+struct OneNumber {
+    choice: u32,
+    value: u32,
+    node: NodeId,
+    at: u32,
+}
+
+impl OneNumber {
+    /// `None` if it depends on several choices.
+    fn new(given: &Given, node: NodeId, at: usize) -> Option<OneNumber> {
+        let at = u32::try_from(at).ok()?;
+        match given[..] {
+            [] => Some(OneNumber { choice: NONE, value: 0, node, at }),
+            [(choice, value)] => Some(OneNumber { choice, value, node, at }),
+            _ => None,
+        }
+    }
+
+    /// Whether the choice has this value.
+    #[inline]
+    fn applies(&self, values: &[usize]) -> bool {
+        self.choice == NONE || values.get(self.choice as usize) == Some(&(self.value as usize))
+    }
 }
 
 /// What a node keeps besides its value, and where that is on a tape.
@@ -89,6 +124,20 @@ impl InPlace {
             Besides::Evaluation(call) => *call = tape.place_of_score(call),
             Besides::Noise(form) => *form = tape.place_of(form),
         });
+        let numbers = &mut self.number_values;
+        self.values.retain(|(given, n, form)| {
+            let Form::Num(at) = form else { return true };
+            let one = OneNumber::new(given, *n, *at);
+            numbers.extend(one);
+            one.is_none()
+        });
+        let numbers = &mut self.number_scores;
+        self.scores.retain(|(given, n, scored)| {
+            let Scored::Numbers(run, false) = scored else { return true };
+            let one = OneNumber::new(given, *n, run.start);
+            numbers.extend(one);
+            one.is_none()
+        });
         self
     }
 
@@ -103,26 +152,27 @@ impl InPlace {
                 self.made.push(value);
             }
         }
-        self.scores.iter().filter(|(given, n, _)| holds(graph, given, *n, values)).all(
-            |(_, n, scored)| {
-                let terms = tape.terms(scored, &mut self.each, &mut self.columns);
-                let node = &graph.nodes[*n as usize];
-                match (graph.op(code, *n), node.side.as_deref(), terms) {
-                    (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
-                        c.scores.len() == self.each.len() && c.elements != NONE
+        let one = |s: &OneNumber| {
+            let node = &graph.nodes[s.node as usize];
+            !s.applies(values)
+                || node.state != State::Clean
+                || takes_one(graph.op(code, s.node), node.side.as_deref())
+        };
+        self.number_scores.iter().all(one)
+            && self.scores.iter().filter(|(given, n, _)| holds(graph, given, *n, values)).all(
+                |(_, n, scored)| {
+                    let terms = tape.terms(scored, &mut self.each, &mut self.columns);
+                    let node = &graph.nodes[*n as usize];
+                    match (graph.op(code, *n), node.side.as_deref(), terms) {
+                        (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
+                            c.scores.len() == self.each.len() && c.elements != NONE
+                        }
+                        (Op::Observe { .. }, Some(Side::Total(_)), Some(_)) => true,
+                        (op, side, Some(ScoreTerms::One(_))) => takes_one(op, side),
+                        _ => false,
                     }
-                    (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::One(_))) => {
-                        c.elements == NONE
-                    }
-                    (Op::Draw { .. }, None, Some(ScoreTerms::One(_))) => true,
-                    (Op::Observe { .. }, Some(Side::Total(_)), Some(_)) => true,
-                    (Op::Observe { .. } | Op::Factor { .. }, None, Some(ScoreTerms::One(_))) => {
-                        true
-                    }
-                    _ => false,
-                }
-            },
-        )
+                },
+            )
     }
 
     /// Moves the trace to the point of the tape's last run, after [`InPlace::fits`]. The
@@ -135,6 +185,16 @@ impl InPlace {
         values: &[usize],
         before: Option<&ScoreSums>,
     ) {
+        for v in &self.number_values {
+            let node = &mut graph.nodes[v.node as usize];
+            if v.applies(values) && node.state == State::Clean {
+                let now = tape.number(v.at as usize);
+                match &mut node.value {
+                    Value::Num(x) => *x = now,
+                    other => *other = Value::Num(now),
+                }
+            }
+        }
         let mut made = self.made.drain(..);
         for (given, n, form) in &self.values {
             if !holds(graph, given, *n, values) {
@@ -197,12 +257,60 @@ impl InPlace {
                 graph.put_scored(code, *n, &mut new.prior, &mut new.likelihood);
             }
         }
+        drop(made);
+        self.put_number_scores((graph, code, tape), values, [&mut old, &mut new]);
         let (new, old) = match before {
             Some(before) => (tape.sums(), before),
             None => (&new, &old),
         };
         new.replace(old, &mut graph.prior, &mut graph.likelihood);
         graph.revision += 1;
+    }
+
+    /// Gives nodes the scores that are one number on the tape, and adds the former and the
+    /// present ones, where they differ, to the sums.
+    fn put_number_scores(
+        &mut self,
+        (graph, code, tape): (&mut Graph, &Code, &Tape),
+        values: &[usize],
+        [old, new]: [&mut ScoreSums; 2],
+    ) {
+        self.old.iter_mut().chain(&mut self.new).for_each(Vec::clear);
+        for s in &self.number_scores {
+            let node = &mut graph.nodes[s.node as usize];
+            if !s.applies(values) || node.state != State::Clean {
+                continue;
+            }
+            let score = tape.number(s.at as usize);
+            let likelihood = usize::from(!matches!(code.ops[node.op as usize], Op::Draw { .. }));
+            match node.side.as_deref_mut() {
+                Some(Side::Total(t)) => {
+                    if node.score == 0.0 {
+                        old.likelihood.merge(&t.sum);
+                    }
+                    t.sum = ExactSum::default();
+                }
+                _ if node.score.to_bits() == score.to_bits() => continue,
+                _ => {}
+            }
+            self.old[likelihood].push(node.score);
+            self.new[likelihood].push(score);
+            node.score = score;
+        }
+        for (sums, terms) in [(old, &self.old), (new, &self.new)] {
+            sums.prior.add_all(&terms[0]);
+            sums.likelihood.add_all(&terms[1]);
+        }
+    }
+}
+
+/// Whether a node with this operation and side can take a score that is one term.
+fn takes_one(op: &Op, side: Option<&Side>) -> bool {
+    match (op, side) {
+        (Op::Draw { .. }, Some(Side::Choice(c))) => c.elements == NONE,
+        (Op::Draw { .. } | Op::Observe { .. } | Op::Factor { .. }, None) => true,
+        (Op::Observe { .. }, Some(Side::Total(_))) => true,
+        _ => false,
     }
 }
 

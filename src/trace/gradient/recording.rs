@@ -27,6 +27,9 @@ pub struct Recording {
     /// The coordinates of that state, if the tape was last run there.
     here: Option<Vec<f64>>,
     summed: SummedChoices,
+    /// The indices of the values that the choices summed out have in the trace, if it is
+    /// still at this revision.
+    drawn: Option<(u64, Vec<usize>)>,
 }
 
 /// Finite choices that are summed out of a recorded density.
@@ -78,6 +81,7 @@ impl Recording {
             start: ScoreSums::default(),
             here: None,
             summed,
+            drawn: None,
         }
     }
 
@@ -213,21 +217,12 @@ impl Recording {
             return false;
         }
         let drawn = self.tape.draw(rng);
-        let changed = self.summed.at(&drawn).filter(|(t, x)| trace.stored(*t).as_ref() != Some(*x));
-        let changes: Vec<_> = changed.map(|(t, x)| (t, Change::Set(x.clone()))).collect();
-        if !changes.is_empty() {
-            // Where the trace is, these values may be impossible.
-            let possible = |w: Weight| w.appeared + w.vanished == 0 && w.log_joint.is_finite();
-            if !trace.propose(&changes, draws).is_ok_and(possible) {
-                trace.rollback();
-                return false;
-            }
-        }
+        let Some(back) = set(trace, self.changed(trace, &drawn), draws) else { return false };
         if y.is_some()
             && let Some(in_place) = &mut self.in_place
         {
             if !in_place.fits(&trace.graph, &trace.code, &self.tape, &drawn) {
-                trace.rollback();
+                put_back(trace, &back, draws);
                 return false;
             }
             trace.commit();
@@ -236,8 +231,22 @@ impl Recording {
         }
         trace.commit();
         self.revision = trace.graph.revision;
+        self.drawn = Some((self.revision, drawn));
         self.here = Some(here.clone());
         true
+    }
+
+    /// The changes that give the choices summed out the values with these indices.
+    fn changed(&self, trace: &Trace, drawn: &[usize]) -> Vec<(Target, Change)> {
+        let set = |(t, x): (Target, &Datum)| (t, Change::Set(x.clone()));
+        let all = self.summed.at(drawn);
+        match &self.drawn {
+            Some((revision, now)) if *revision == trace.graph.revision && self.holds(trace) => {
+                let differs = now.iter().zip(drawn).map(|(now, drawn)| now != drawn);
+                all.zip(differs).filter(|(_, differs)| *differs).map(|(one, _)| set(one)).collect()
+            }
+            _ => all.filter(|(t, x)| trace.stored(*t).as_ref() != Some(*x)).map(set).collect(),
+        }
     }
 
     /// Returns the log Jacobian in the state to which densities are relative.
@@ -249,5 +258,42 @@ impl Recording {
     /// not known.
     pub fn gradient(&mut self, y: &[f64], power: f64, out: &mut Vec<f64>) -> bool {
         self.tape.gradient(y, power, out)
+    }
+}
+
+/// Gives choices new values: in place where local densities can, which costs less, and by an
+/// update that is pending for the others. Returns the changes that undo what was done in
+/// place. `None`, with the trace unchanged, where the values are impossible.
+fn set(
+    trace: &mut Trace,
+    changes: Vec<(Target, Change)>,
+    draws: Draws,
+) -> Option<Vec<(Target, Change)>> {
+    let (mut back, mut others) = (Vec::new(), Vec::new());
+    for (t, change) in changes {
+        let old = trace.stored(t);
+        let done = match (&change, trace.dist(t)) {
+            (Change::Set(x), Some(dist)) => trace.set_in_place(t, &dist, x),
+            _ => false,
+        };
+        match old.filter(|_| done) {
+            Some(old) => back.push((t, Change::Set(old))),
+            None => others.push((t, change)),
+        }
+    }
+    // Where the trace is, these values may be impossible.
+    let possible = |w: Weight| w.appeared + w.vanished == 0 && w.log_joint.is_finite();
+    if others.is_empty() || trace.propose(&others, draws).is_ok_and(possible) {
+        return Some(back);
+    }
+    put_back(trace, &back, draws);
+    None
+}
+
+/// Undoes the pending update, and these changes.
+fn put_back(trace: &mut Trace, back: &[(Target, Change)], draws: Draws) {
+    trace.rollback();
+    if !back.is_empty() && trace.propose(back, draws).is_ok() {
+        trace.commit();
     }
 }

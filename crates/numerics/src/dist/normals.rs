@@ -5,6 +5,7 @@ use super::batch::{component, parts};
 use super::continuous::log_norm;
 use super::draw::standard;
 use super::{Batch, Dist, Normal};
+use crate::num::simd::{sum_of_triples, vectorised_if_many};
 use crate::num::{Column, ExactSum};
 
 /// Creates the batch of a scalar distribution, or of a distribution whose elements are
@@ -47,6 +48,7 @@ impl Normals {
     }
 
     /// Takes the parameters from the buffer. False if one is outside its domain.
+    #[inline(always)]
     fn refresh(&mut self, buffer: &[f64], params: &[Column]) -> bool {
         let [mean, sd] = params else { return true };
         let n = self.mean.len();
@@ -74,6 +76,7 @@ impl Normals {
     }
 
     /// Standardises the numbers. False if one is NaN.
+    #[inline(always)]
     fn standardise(&mut self, buffer: &[f64], x: Column, n: usize) -> bool {
         self.z.resize(n, 0.0);
         let (z, mean, sd) = (&mut self.z[..], &self.mean[..], &self.sd[..]);
@@ -115,6 +118,15 @@ impl Normals {
     /// Computes the log densities. False if a number is NaN or a parameter is outside its
     /// domain.
     fn compute(&mut self, buffer: &[f64], x: Column, params: &[Column], n: usize) -> bool {
+        vectorised_if_many(
+            n,
+            #[inline(always)]
+            || self.compute_here(buffer, x, params, n),
+        )
+    }
+
+    #[inline(always)]
+    fn compute_here(&mut self, buffer: &[f64], x: Column, params: &[Column], n: usize) -> bool {
         if !self.refresh(buffer, params) || !self.standardise(buffer, x, n) {
             return false;
         }
@@ -131,57 +143,77 @@ impl Normals {
         true
     }
 
-    /// Adds the derivatives with respect to a column, as a function of the standardised
-    /// number and the standard deviation, each times its weight, and all times `all`.
+    /// Adds the derivatives with respect to a column: `slope` is their product with the
+    /// standard deviation, as a function of the standardised number. Each is multiplied by
+    /// its weight, a function of the number in `weights` at its place, and all by `all`.
     #[inline(always)]
     fn add(
         &self,
         by: &mut [f64],
         c: &Column,
-        weights: impl Iterator<Item = f64>,
+        (weights, weight): (&[f64], impl Fn(f64) -> f64),
         all: f64,
-        slope: impl Fn(f64, f64) -> f64,
+        slope: impl Fn(f64) -> f64,
     ) {
         // An infinite slope does not matter where the weight is 0.
         let times = |slope: f64, weight: f64| if weight == 0.0 { 0.0 } else { slope * weight };
-        let each = self.z.iter().zip(weights);
+        let z = &self.z[..];
         if c.step == 0 {
-            by[c.at] += all
-                * match &self.sd[..] {
-                    [sd] => each.fold(0.0, |sum, (z, w)| sum + times(slope(*z, *sd), w)),
-                    sds => {
-                        each.zip(sds).fold(0.0, |sum, ((z, w), sd)| sum + times(slope(*z, *sd), w))
-                    }
-                };
+            by[c.at] += match &self.sd[..] {
+                [sd] => {
+                    let part = |z, w, _| times(slope(z), weight(w));
+                    all * (sum_of_triples(z, weights, weights, part) / sd)
+                }
+                sds => {
+                    let part = |z, w, sd| times(slope(z) / sd, weight(w));
+                    all * sum_of_triples(z, weights, sds, part)
+                }
+            };
             return;
         }
-        let each = by[c.at..].iter_mut().zip(each);
+        let each = by[c.at..].iter_mut().zip(z).zip(weights);
         match &self.sd[..] {
-            [sd] => each.for_each(|(g, (z, w))| *g += times(slope(*z, *sd), w) * all),
-            sds => each.zip(sds).for_each(|((g, (z, w)), sd)| *g += times(slope(*z, *sd), w) * all),
+            // The factor is infinite for subnormal deviations only.
+            [sd] if (all / sd).is_finite() => {
+                let factor = all / sd;
+                each.for_each(|((g, z), w)| *g += times(slope(*z), weight(*w)) * factor);
+            }
+            [sd] => each.for_each(|((g, z), w)| *g += times(slope(*z) / sd, weight(*w)) * all),
+            sds => {
+                let each = each.zip(sds);
+                each.for_each(|(((g, z), w), sd)| {
+                    *g += times(slope(*z) / sd, weight(*w)) * all;
+                });
+            }
         }
     }
 
-    /// Adds the derivatives with respect to all columns.
+    /// Adds the derivatives with respect to all columns, as [`Normals::add`] does.
     #[inline(always)]
     fn add_slopes(
         &self,
         by: &mut [f64],
         (x, params): (Column, &[Column]),
-        weights: impl Iterator<Item = f64> + Clone,
+        weights: (&[f64], impl Fn(f64) -> f64 + Copy),
         all: f64,
     ) {
-        if x.live {
-            self.add(by, &x, weights.clone(), all, |z, sd| -z / sd);
-        }
-        if let [mean, sd] = params {
-            if mean.live {
-                self.add(by, mean, weights.clone(), all, |z, sd| z / sd);
-            }
-            if sd.live {
-                self.add(by, sd, weights, all, |z, sd| (z * z - 1.0) / sd);
-            }
-        }
+        vectorised_if_many(
+            self.z.len(),
+            #[inline(always)]
+            || {
+                if x.live {
+                    self.add(by, &x, weights, all, |z| -z);
+                }
+                if let [mean, sd] = params {
+                    if mean.live {
+                        self.add(by, mean, weights, all, |z| z);
+                    }
+                    if sd.live {
+                        self.add(by, sd, weights, all, |z| z * z - 1.0);
+                    }
+                }
+            },
+        );
     }
 }
 
@@ -196,7 +228,7 @@ impl Batch for Normals {
     ) -> bool {
         let there = self.compute(buffer, x, params, n);
         if there {
-            sum.add_each(self.terms.iter().copied());
+            sum.add_all(&self.terms);
         }
         there
     }
@@ -206,7 +238,7 @@ impl Batch for Normals {
     }
 
     fn vjp(&self, _: &[f64], by: &mut [f64], x: Column, params: &[Column], _: usize, weight: f64) {
-        self.add_slopes(by, (x, params), std::iter::repeat(1.0), weight);
+        self.add_slopes(by, (x, params), (&self.z, |_| 1.0), weight);
     }
 
     fn score_each(
@@ -235,7 +267,7 @@ impl Batch for Normals {
     ) {
         // What is read is before what is written.
         let (by, weights) = by.split_at_mut(out);
-        self.add_slopes(by, (x, params), weights[..n].iter().copied(), 1.0);
+        self.add_slopes(by, (x, params), (&weights[..n], |w| w), 1.0);
     }
 }
 
@@ -243,16 +275,22 @@ impl Batch for Normals {
 mod tests {
     use super::*;
 
-    /// The distributions themselves, one by one.
     #[test]
     fn columns_are_those_of_single_distributions() {
-        let n = 5;
+        compare(5);
+        // Enough to be vectorised, with a rest.
+        compare(75);
+    }
+
+    /// Compares a batch with the distributions themselves, one by one.
+    fn compare(n: usize) {
+        let repeated = |xs: [f64; 5]| xs.into_iter().cycle().take(n);
         // Numbers, means and standard deviations, then a place for each log density.
-        let mut buffer: Vec<f64> = vec![0.3, -1.0, 2.5, 1e100, 0.0];
-        buffer.extend([0.1, 0.2, -0.3, 0.4, 0.5]);
-        buffer.extend([1.0, 0.5, 2.0, 1e-3, 0.7]);
+        let mut buffer: Vec<f64> = repeated([0.3, -1.0, 2.5, 1e100, 0.0]).collect();
+        buffer.extend(repeated([0.1, 0.2, -0.3, 0.4, 0.5]));
+        buffer.extend(repeated([1.0, 0.5, 2.0, 1e-3, 0.7]));
         buffer.resize(4 * n, f64::NAN);
-        let weights = [0.5, -2.0, 0.0, 1e-3, 1.5];
+        let weights: Vec<f64> = repeated([0.5, -2.0, 0.0, 1e-3, 1.5]).collect();
         let column = |at: usize, step: usize| Column { at, step, live: true };
         let one = Dist::Normal(Normal::new(0.0, 1.0).unwrap());
         for steps in 0..8 {
@@ -265,7 +303,7 @@ mod tests {
                 let mut own = buffer.clone();
                 assert!(batch.score_each(&mut own, x, &params, n, 3 * n));
                 let mut by = vec![0.0; 3 * n];
-                by.extend(weights);
+                by.extend(&weights);
                 batch.vjp_each(&own, &mut by, x, &params, n, 3 * n);
                 by.truncate(3 * n);
                 (own, by)

@@ -59,6 +59,9 @@ pub fn log_sum_exp_rows(rows: &mut [f64], out: &mut [f64]) -> bool {
     if n == 0 {
         return true;
     }
+    if rows.len() == 2 * n {
+        return log_sum_exp_of_two(rows, out);
+    }
     vectorised(
         #[inline(always)]
         || {
@@ -98,6 +101,34 @@ pub fn log_sum_exp_rows(rows: &mut [f64], out: &mut [f64]) -> bool {
     )
 }
 
+/// [`log_sum_exp_rows`] for two rows, with the same bits: the exponential of the larger
+/// weight, less itself, is 1, so one exponential is enough.
+fn log_sum_exp_of_two(rows: &mut [f64], out: &mut [f64]) -> bool {
+    let n = out.len();
+    let (first, second) = rows.split_at_mut(n);
+    let second = &mut second[..n];
+    vectorised(
+        #[inline(always)]
+        || {
+            let mut defined = true;
+            for ((a, b), out) in first.iter_mut().zip(second.iter_mut()).zip(out.iter_mut()) {
+                defined &= !(a.is_nan() | b.is_nan());
+                let (most, least) = if *a > *b { (*a, *b) } else { (*b, *a) };
+                let small = exp(least - most);
+                let large = if most.abs() < f64::INFINITY { 1.0 } else { 0.0 };
+                let sum = large + small;
+                let some = sum > 0.0;
+                let shares = if some { (large / sum, small / sum) } else { (0.0, 0.0) };
+                let a_is_most = *a > *b;
+                *out = most + if some { ln(sum) } else { 0.0 };
+                *a = if a_is_most { shares.0 } else { shares.1 };
+                *b = if a_is_most { shares.1 } else { shares.0 };
+            }
+            defined
+        },
+    )
+}
+
 /// How many numbers are handled at a time.
 const STRIP: usize = 128;
 
@@ -117,6 +148,26 @@ mod tests {
             assert!((found - expected).abs() < 1e-15 * expected.max(1.0), "ln {x}: {found}");
         }
         assert_eq!((exp(0.0), exp(f64::NEG_INFINITY), exp(-1e300), ln(1.0)), (1.0, 0.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn two_rows_have_the_bits_of_more() {
+        let mut rows: Vec<f64> = (0..400).map(|i| 40.0 * libm::sin(f64::from(i) * 1.3)).collect();
+        let special = [0.0, -0.0, 1e300, -1e300, f64::INFINITY, f64::NEG_INFINITY, 3.0, -750.0];
+        rows.extend(special.iter().flat_map(|_| special));
+        rows.extend(special.iter().flat_map(|x| [*x; 8]));
+        // Two columns of 264 numbers: the last 64 of each are all pairs of special ones.
+        let (tail, n) = (rows.split_off(400), 264);
+        let mut two: Vec<f64> = [&rows[..200], &tail[..64], &rows[200..], &tail[64..]].concat();
+        // A third row that is impossible changes nothing.
+        let mut three = two.clone();
+        three.extend(vec![f64::NEG_INFINITY; n]);
+        let (mut found, mut expected) = (vec![0.0; n], vec![0.0; n]);
+        assert!(log_sum_exp_rows(&mut two, &mut found));
+        assert!(log_sum_exp_rows(&mut three, &mut expected));
+        let bits = |xs: &[f64]| xs.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&found), bits(&expected));
+        assert_eq!(bits(&two), bits(&three[..2 * n]));
     }
 
     #[test]

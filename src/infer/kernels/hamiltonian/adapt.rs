@@ -1,6 +1,8 @@
 //! Warm-up of Hamiltonian kernels: dual averaging of the step size (Hoffman & Gelman
 //! 2014, section 3.2), and a diagonal metric from the variances over windows that double
-//! in length, as in Stan.
+//! in length, as in Stan. Other than in Stan, the variances are not shrunk towards 1e-3,
+//! which is no small value where a scale is smaller; and other than in nutpie, forces do
+//! not count (docs/measurements/speed.md says what both cost).
 
 use super::point::Point;
 use super::system::System;
@@ -24,6 +26,10 @@ const LONGEST: f64 = 10.0;
 const DOUBLINGS: u32 = 40;
 const HALVINGS: u32 = 400;
 
+/// The largest inverse mass; the smallest is one over it. Squares of momenta and of velocities
+/// then are finite.
+const LIGHTEST: f64 = 1e140;
+
 /// The number of initial states that are excluded from the variances, and the length of
 /// the first window.
 const BURN: u32 = 30;
@@ -36,7 +42,7 @@ pub(super) struct Adaptation {
     /// What the metric belongs to: addresses and their numbers of coordinates.
     signature: Vec<(u64, usize)>,
     pub inverse_mass: Vec<f64>,
-    /// By address, the variances from the last windows. Choices that disappear and
+    /// By address, the inverse masses from the last windows. Choices that disappear and
     /// reappear get theirs again, so that after warm-up the metric is a function of the
     /// set of choices.
     learnt: BTreeMap<u64, Vec<f64>>,
@@ -76,12 +82,17 @@ impl Moments {
         }
     }
 
-    /// The variances, shrunk towards a small value if there are few states, as in Stan;
-    /// `None` for fewer than two states.
-    fn variances(&self) -> Option<Vec<f64>> {
-        let n = self.count;
-        let variance = |s: &f64| (n / (n + 5.0)) * (s / (n - 1.0)) + 1e-3 * 5.0 / (n + 5.0);
-        (n >= 2.0).then(|| self.square.iter().map(variance).collect())
+    /// The variances, which are the inverse masses; `None` for too few states. Where the
+    /// states do not vary, for instance since every transition was rejected, nothing is
+    /// learnt and what was known `before` stays.
+    fn variances(&self, before: Option<&Vec<f64>>) -> Option<Vec<f64>> {
+        let one = |(i, s): (usize, &f64)| {
+            let found = s / (self.count - 1.0);
+            let before = || before.and_then(|b| b.get(i)).copied().unwrap_or(1.0);
+            let known = found.is_finite() && found > 0.0;
+            if known { found.clamp(LIGHTEST.recip(), LIGHTEST) } else { before() }
+        };
+        (self.count >= 3.0).then(|| self.square.iter().enumerate().map(one).collect())
     }
 }
 
@@ -173,27 +184,36 @@ impl Adaptation {
             }
         }
         if self.seen == self.window_end {
-            self.close();
+            let log_longer = self.close();
             self.window = self.window.saturating_mul(2);
             self.window_end = self.seen.saturating_add(self.window);
-            // The step size is adapted again for the new metric, starting from its
-            // present value.
-            self.mean_log = libm::log(10.0 * self.averaged);
-            (self.bias, self.rounds) = (0.0, 0.0);
-            self.step = self.averaged;
+            // The step size is searched for again at the next transition, since the new
+            // metric may differ from the last by tens of orders of magnitude.
+            let log_step = libm::log(self.averaged.max(f64::MIN_POSITIVE)) + log_longer;
+            self.averaged = libm::exp(log_step.clamp(SHORTEST, LONGEST));
+            (self.bias, self.rounds, self.step) = (0.0, 0.0, 0.0);
         }
     }
 
-    /// Ends a window: its variances become the metric of the choices that it saw at least
-    /// twice.
-    fn close(&mut self) {
-        let seen = std::mem::take(&mut self.states);
-        self.learnt.extend(seen.into_iter().filter_map(|(hash, m)| Some((hash, m.variances()?))));
-        self.inverse_mass = self.metric();
+    /// Ends a window: it gives the metric of the choices that it saw often enough. Returns
+    /// the log of the factor by which a step has to grow to stay as long as it was, in the
+    /// geometric mean over all coordinates.
+    fn close(&mut self) -> f64 {
+        for (hash, moments) in std::mem::take(&mut self.states) {
+            let before = self.learnt.get(&hash);
+            if let Some(masses) = moments.variances(before) {
+                self.learnt.insert(hash, masses);
+            }
+        }
+        let metric = self.metric();
+        let before = std::mem::replace(&mut self.inverse_mass, metric);
+        let pairs = before.iter().zip(&self.inverse_mass);
+        let sum: f64 = pairs.map(|(old, new)| 0.5 * (libm::log(*old) - libm::log(*new))).sum();
+        sum / before.len().max(1) as f64
     }
 
-    /// The inverse masses of the present choices: the variances of previous windows, or 1
-    /// for those without.
+    /// The inverse masses of the present choices: those of previous windows, or 1 for
+    /// choices without.
     fn metric(&self) -> Vec<f64> {
         let known =
             |(hash, n): &(u64, usize)| self.learnt.get(hash).filter(|m| m.len() == *n).cloned();
@@ -234,5 +254,50 @@ impl Adaptation {
         self.mean_log = libm::log(10.0 * step);
         (self.bias, self.rounds) = (0.0, 0.0);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn variances(states: &[f64], before: Option<&Vec<f64>>) -> Option<Vec<f64>> {
+        let mut moments = Moments::default();
+        states.iter().for_each(|y| moments.add(&[*y]));
+        moments.variances(before)
+    }
+
+    #[test]
+    fn variances_are_those_of_states_of_any_scale() {
+        for scale in [1e-40, 1e-3, 1.0, 1e30] {
+            let states = [1.0, 2.0, 3.0, 4.0].map(|z| z * scale);
+            let found = variances(&states, None).unwrap()[0] / scale / scale;
+            assert!((found - 5.0 / 3.0).abs() < 1e-9, "{scale}: {found}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_learnt_from_few_states_or_from_one_that_stays() {
+        assert_eq!(variances(&[1.0, 2.0], None), None);
+        assert_eq!(variances(&[1.0; 9], Some(&vec![5.0])), Some(vec![5.0]));
+        assert_eq!(variances(&[1.0; 9], None), Some(vec![1.0]));
+        assert_eq!(variances(&[1e300, -1e300, 0.0], None), Some(vec![1.0]));
+    }
+
+    #[test]
+    fn a_step_stays_as_long_as_it_was_when_the_metric_changes() {
+        let mut adaptation = Adaptation::new(0.8, None);
+        adaptation.signature = vec![(7, 1)];
+        adaptation.inverse_mass = vec![1.0];
+        adaptation.step = 1e-30;
+        adaptation.averaged = 1e-30;
+        adaptation.mean_log = libm::log(1e-30);
+        for i in 0..BURN + WINDOW {
+            adaptation.learn(0.8, &[1e-30 * f64::from(i % 5)]);
+        }
+        // It is to be searched for, from about where it was.
+        assert_eq!(adaptation.step, 0.0);
+        let length = adaptation.averaged * adaptation.inverse_mass[0].sqrt();
+        assert!((length / 1e-30 - 1.0).abs() < 1e-6, "{length}");
     }
 }

@@ -212,8 +212,12 @@ impl Memory {
 
     /// Moves the trace to a point in place, without a proposal. False, with the trace
     /// unchanged, if only a proposal can do that.
-    pub fn move_to(&mut self, trace: &mut Trace, to: &Point) -> bool {
-        self.end_in_place(true, |tape, here| tape.move_to(trace, &to.y, here))
+    pub fn move_to(&mut self, trace: &mut Trace, to: &Point, power: f64) -> bool {
+        let there = self.end_in_place(true, |tape, here| tape.move_to(trace, &to.y, here));
+        if there {
+            self.stay_at(to, power);
+        }
+        there
     }
 
     /// Draws the choices that are summed out at a point, or where the trace is, and moves the
@@ -228,13 +232,34 @@ impl Memory {
     ) -> bool {
         let y = to.map(|to| &to.y[..]);
         let draws = at.draws(0);
-        self.end_in_place(y.is_some(), |tape, here| {
+        let there = self.end_in_place(y.is_some(), |tape, here| {
             tape.draw_and_move_to(trace, y, here, rng, draws)
-        })
+        });
+        if let (true, Some(to)) = (there, to) {
+            self.stay_at(to, at.power);
+        }
+        there
     }
 
-    /// Ends a step in place by `go`, which tells whether it could. The force where the trace
-    /// then is is computed when the next step begins there, if one does.
+    /// Keeps the force at a point where a step ended. Not if the trace is elsewhere in the
+    /// last bits, since the values there do not have exactly these coordinates: then the
+    /// force is computed when the next step begins there, if one does.
+    fn stay_at(&mut self, to: &Point, power: f64) {
+        let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+        if self.ended.len() != to.y.len() || !self.ended.iter().zip(&to.y).all(same) {
+            return;
+        }
+        let mut here = self.point();
+        if let Some(point) = Arc::get_mut(&mut here) {
+            point.y.clone_from(&to.y);
+            point.gradient.clone_from(&to.gradient);
+            point.log_density = 0.0;
+            self.here = Some((Arc::clone(&here), power));
+        }
+        self.keep(&here);
+    }
+
+    /// Ends a step in place by `go`, which tells whether it could.
     fn end_in_place(
         &mut self,
         moves: bool,

@@ -288,7 +288,7 @@ impl<'a> System<'a> {
             self.trace.rollback();
             return Ok(false);
         };
-        if self.taped && self.memory.move_to(self.trace, point) {
+        if self.taped && self.memory.move_to(self.trace, point, self.at.power) {
             return Ok(true);
         }
         // The value of the density no longer matters, only whether it is positive.
