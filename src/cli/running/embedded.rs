@@ -15,9 +15,10 @@ use pcadlang::render::View;
 use pcadlang::report::RunDir;
 use pcadlang::report::embedded::{EmbeddedDraw, embedded};
 use pcadlang::report::pictures::jpeg;
-use pcadlang::scene::ViewValue;
+use pcadlang::scene::{ImageValue, ViewValue};
 use pcadlang::session::Layer;
 use pcadlang::trace::Trace;
+use pcadlang_numerics::platform::threads::map_side_by_side;
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 
@@ -70,19 +71,29 @@ pub fn write_scene(
         });
     }
     let Some(mut scene) = embedded(view.camera(), &all) else { return Ok(()) };
-    scene["photo"] = json!(layer(Layer::Photo, view, ready, located));
-    scene["layers"] = Value::Object(layers(view, ready, located));
+    // Drawing and coding the pictures takes most of the time of a quick run's end.
+    let image = ready.image();
+    let drawn = map_side_by_side(&Layer::ALL, |l| layer(*l, view, image, located));
+    let mut layers = Map::new();
+    for (l, picture) in Layer::ALL.into_iter().zip(drawn) {
+        match picture {
+            _ if l == Layer::Photo => scene["photo"] = json!(picture),
+            Some(picture) => drop(layers.insert(l.name().to_owned(), json!(picture))),
+            None => {}
+        }
+    }
+    scene["layers"] = Value::Object(layers);
     write_in(dir, SCENE, scene.to_string().as_bytes())
 }
 
-/// Draws the layers that apply, as `data:` addresses.
-fn layers(view: &Arc<View>, ready: &Ready, located: &[Located]) -> Map<String, Value> {
-    let of = |l: Layer| Some((l.name().to_owned(), json!(layer(l, view, ready, located)?)));
-    Layer::ALL.into_iter().filter(|l| *l != Layer::Photo).filter_map(of).collect()
-}
-
-fn layer(layer: Layer, view: &Arc<View>, ready: &Ready, located: &[Located]) -> Option<String> {
-    let picture: RgbImage = layer.draw(view, ready.image(), located, SIDE).ok()?;
+/// Draws a layer, if it applies, as a `data:` address.
+fn layer(
+    layer: Layer,
+    view: &Arc<View>,
+    image: Option<&ImageValue>,
+    located: &[Located],
+) -> Option<String> {
+    let picture: RgbImage = layer.draw(view, image, located, SIDE).ok()?;
     let bytes = jpeg(&picture, QUALITY).ok()?;
     Some(format!("data:image/jpeg;base64,{}", BASE64_STANDARD.encode(bytes)))
 }

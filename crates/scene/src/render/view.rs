@@ -164,10 +164,11 @@ impl View {
     pub(super) fn covered(&self, size: u32) -> Arc<Fractions> {
         once(&self.fractions, size, || {
             let Scene { solid, camera } = self.scene(size);
-            Arc::new(match solid.revolution() {
-                Some(r) => Fractions::of_revolution(&r.surface, &r.affine, &camera),
-                None => Fractions::of(&solid, &camera),
-            })
+            let samples = solid.revolution().is_none().then(|| Fractions::of(&solid, &camera));
+            Arc::new(samples.flatten().unwrap_or_else(|| {
+                let draw = |finer: &Camera| drawn_frame(&solid, finer, Channels::Depth);
+                Fractions::by_pixels(&camera, draw)
+            }))
         })
     }
 

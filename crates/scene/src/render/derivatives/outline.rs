@@ -32,9 +32,7 @@ impl View {
     pub fn vjp_fractions(&self, size: u32, gain: &[f64]) -> Vec<DVec3> {
         let camera = self.camera().scaled_to(size);
         let drawn = self.drawn(&camera);
-        if drawn.solid.revolution().is_none()
-            && let Some(by_vertex) = self.covered(size).vjp(&drawn.solid, &camera, gain)
-        {
+        if let Some(by_vertex) = self.covered(size).vjp(&drawn.solid, &camera, gain) {
             return drawn.by_vertices_of(self.solid(), by_vertex);
         }
         self.vjp_outline(size, |picture, piece, length| {

@@ -1,41 +1,42 @@
-//! The fraction of every pixel that a solid covers, and how it changes with the vertices.
+//! The fraction of every pixel that a solid covers.
 //!
 //! Pixels are sampled in rows of 64, a word for each, so a triangle's row of samples is set a
 //! word at a time. Triangles that share an edge find the same place for it in each row, so no
 //! sample is lost between them. What hides what does not matter.
-//!
-//! Where the edge of a triangle lies between a sample that is covered and one that is not, it
-//! is the outline there. Its place in a row is a smooth function of its two vertices, which
-//! gives exact derivatives, save for the steps of 1/256 of a pixel.
 
-use crate::geom::{Affine, Instance, Mesh, Revolution, Solid};
+use crate::geom::{Mesh, Solid};
 use crate::render::pixels::place::Point;
 use crate::render::pixels::project::{Placement, Projected, Vertices, project};
 use crate::render::pixels::raster::{back_of, cut_triangles};
 use crate::render::simd::vectorised;
-use crate::render::{Camera, Channels, Frame};
-use glam::DVec3;
+use crate::render::{Camera, Frame};
 use std::ops::Range;
 use std::sync::Arc;
 
 /// Samples in a row of a pixel, and rows of them.
-const COLUMNS: usize = u64::BITS as usize;
-const ROWS: usize = 4;
+pub(in crate::render) const COLUMNS: usize = u64::BITS as usize;
+pub(in crate::render) const ROWS: usize = 4;
 
-/// Columns and rows of finer pixels in one, where there are no triangles.
+/// Columns and rows of finer pixels in one, where there are no samples.
 const FINER: u32 = 8;
+/// The most pixels of a finer picture, and the most words of samples.
+const MOST: usize = 1 << 22;
 
 /// What a solid covers.
 pub(in crate::render) struct Fractions {
     /// The fraction of every pixel, 0 to 1, row by row.
     pub values: Arc<[f32]>,
-    samples: Samples,
-    projected: Projected,
+    /// `None` if the values are from a finer picture.
+    pub samples: Option<Samples>,
+    pub projected: Projected,
 }
 
 impl Fractions {
-    /// Those of the meshes of a solid.
-    pub fn of(solid: &Solid, camera: &Camera) -> Fractions {
+    /// Those of the meshes of a solid, unless the picture is too large.
+    pub fn of(solid: &Solid, camera: &Camera) -> Option<Fractions> {
+        if camera.pixels().saturating_mul(ROWS) > MOST {
+            return None;
+        }
         let mut projected = Projected::default();
         project(solid, camera, &mut projected);
         let mut samples = Samples::none(camera.width as usize, camera.height as usize);
@@ -55,13 +56,20 @@ impl Fractions {
                 }),
             }
         }
-        Fractions { values: samples.fractions().into(), samples, projected }
+        let values = samples.fractions().into();
+        Some(Fractions { values, samples: Some(samples), projected })
     }
 
-    /// Those of a surface of revolution, from a finer picture.
-    pub fn of_revolution(surface: &Revolution, affine: &Affine, camera: &Camera) -> Fractions {
-        let by = (Camera::MAX_SIDE / camera.width.max(camera.height)).clamp(1, FINER);
-        let frame = Frame::of_revolution(surface, affine, &camera.finer(by), Channels::Depth);
+    /// Those in a finer picture, drawn by `draw`: for what has no mesh, and for pictures so
+    /// large that samples would take too much memory.
+    pub fn by_pixels(camera: &Camera, draw: impl FnOnce(&Camera) -> Frame) -> Fractions {
+        let side = camera.width.max(camera.height);
+        let fits = |by: &u32| {
+            let pixels = camera.pixels().saturating_mul((by * by) as usize);
+            side.saturating_mul(*by) <= Camera::MAX_SIDE && pixels <= MOST
+        };
+        let by = (1..=FINER).rev().find(fits).unwrap_or(1);
+        let frame = draw(&camera.finer(by));
         let (width, by) = (camera.width as usize, by as usize);
         let mut counts = vec![0u32; camera.pixels()];
         for (at, _) in frame.mask().enumerate().filter(|(_, shown)| *shown) {
@@ -71,97 +79,62 @@ impl Fractions {
             }
         }
         let values = counts.into_iter().map(|count| count as f32 / (by * by) as f32).collect();
-        Fractions { values, samples: Samples::none(0, 0), projected: Projected::default() }
+        Fractions { values, samples: None, projected: Projected::default() }
     }
-
-    /// The derivatives of the sum of `gain` times the fraction of each pixel with respect to
-    /// each vertex of the solid's meshes in turn, in world coordinates. `None` if the near
-    /// plane cuts a mesh.
-    pub fn vjp(&self, solid: &Solid, camera: &Camera, gain: &[f64]) -> Option<Vec<DVec3>> {
-        let mut outline =
-            Outline { samples: &self.samples, found: vec![0; self.samples.words.len()], gain };
-        let mut out = Vec::with_capacity(solid.vertex_count());
-        for (i, item) in solid.instances().iter().enumerate() {
-            let vertices = self.projected.mesh(i);
-            if !vertices.whole {
-                return None;
-            }
-            let mut by_vertex = vec![[0.0; 2]; vertices.len()];
-            if !vertices.outside(camera) {
-                let back = back_of(&item.mesh, &Placement::new(camera, &item.affine), true);
-                outline.follow(&item.mesh, &vertices, back, &mut by_vertex);
-            }
-            out.extend(in_world(item, camera, &by_vertex));
-        }
-        Some(out)
-    }
-}
-
-/// The derivatives with respect to vertices in the world, from those with respect to their
-/// places in the picture.
-fn in_world<'a>(
-    item: &'a Instance,
-    camera: &'a Camera,
-    by_vertex: &'a [[f64; 2]],
-) -> impl Iterator<Item = DVec3> + 'a {
-    item.mesh.positions.iter().zip(by_vertex).map(|(p, by)| {
-        if *by == [0.0; 2] {
-            return DVec3::ZERO;
-        }
-        let by = camera.vjp_point(item.affine.point(p.as_dvec3()), *by);
-        if by.is_finite() { by } else { DVec3::ZERO }
-    })
 }
 
 /// Which samples are covered: a word for each pixel, in each row of samples.
-struct Samples {
-    width: usize,
-    rows: usize,
-    words: Vec<u64>,
+pub(in crate::render) struct Samples {
+    /// In pixels.
+    pub width: usize,
+    /// Of samples.
+    pub rows: usize,
+    pub words: Vec<u64>,
 }
 
 /// An edge from its upper to its lower end, in samples: whole numbers are their places.
 #[derive(Clone, Copy)]
-struct Edge {
-    from: [f64; 2],
-    to: [f64; 2],
-    slope: f64,
+pub(in crate::render) struct Edge {
+    pub from: [f64; 2],
+    pub to: [f64; 2],
+    /// Of x by y.
+    pub slope: f64,
 }
 
 impl Edge {
     #[inline(always)]
-    fn new(from: [f64; 2], to: [f64; 2]) -> Edge {
+    pub fn new(from: [f64; 2], to: [f64; 2]) -> Edge {
         Edge { from, to, slope: (to[0] - from[0]) / (to[1] - from[1]) }
     }
 
     /// The rows that it crosses, of so many.
     #[inline(always)]
-    fn rows(&self, most: usize) -> Range<usize> {
+    pub fn rows(&self, most: usize) -> Range<usize> {
         first(self.from[1], most)..first(self.to[1], most)
     }
 
     /// Where it crosses a row.
     #[inline(always)]
-    fn at(&self, row: usize) -> f64 {
+    pub fn at(&self, row: usize) -> f64 {
         self.from[0] + (row as f64 - self.from[1]) * self.slope
     }
 }
 
 /// The first whole number from `v` on, at least 0 and at most `most`; 0 for NaN.
 #[inline(always)]
-fn first(v: f64, most: usize) -> usize {
+pub(in crate::render) fn first(v: f64, most: usize) -> usize {
     (v.ceil().max(0.0) as usize).min(most)
 }
 
 /// A position in the picture, in samples.
 #[inline(always)]
-fn in_samples(p: &Point) -> [f64; 2] {
+pub(in crate::render) fn in_samples(p: &Point) -> [f64; 2] {
     [p.x * COLUMNS as f64 - 0.5, p.y * ROWS as f64 - 0.5]
 }
 
 /// Whether a triangle has the orientation `back`, as in [`back_of`].
 #[inline(always)]
-fn is_back([a, b, c]: &[Point; 3], back: f64) -> bool {
+pub(in crate::render) fn is_back([a, b, c]: &[Point; 3], back: f64) -> bool {
     ((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)) * back > 0.0
 }
 
@@ -232,7 +205,7 @@ impl Samples {
 
     /// Whether a sample is covered.
     #[inline(always)]
-    fn has(&self, row: usize, column: usize) -> bool {
+    pub fn has(&self, row: usize, column: usize) -> bool {
         let word = self.words.get(row * self.width + column / COLUMNS);
         word.is_some_and(|word| word >> (column % COLUMNS) & 1 == 1)
     }
@@ -250,85 +223,12 @@ impl Samples {
     }
 }
 
-/// The search for the edges that are the outline.
-struct Outline<'a> {
-    samples: &'a Samples,
-    /// The samples whose left side is the outline and has been found to be an edge: two
-    /// triangles may have it.
-    found: Vec<u64>,
-    gain: &'a [f64],
-}
-
-impl Outline<'_> {
-    /// Adds to the derivatives with respect to the places of a mesh's vertices, in pixels.
-    fn follow(
-        &mut self,
-        mesh: &Mesh,
-        vertices: &Vertices<'_>,
-        back: f64,
-        by_vertex: &mut [[f64; 2]],
-    ) {
-        vectorised(
-            #[inline(always)]
-            || {
-                for corners in &mesh.topology.triangles {
-                    let points = corners.map(|v| vertices.point(v));
-                    if is_back(&points, back) {
-                        continue;
-                    }
-                    let places = points.each_ref().map(in_samples);
-                    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-                        let (i, j) = if places[i][1] <= places[j][1] { (i, j) } else { (j, i) };
-                        let by = self.along(&Edge::new(places[i], places[j]));
-                        if by == [[0.0; 2]; 2] {
-                            continue;
-                        }
-                        for (v, by) in [corners[i], corners[j]].into_iter().zip(by) {
-                            if let Some(sum) = by_vertex.get_mut(v as usize) {
-                                *sum = [sum[0] + by[0], sum[1] + by[1]];
-                            }
-                        }
-                    }
-                }
-            },
-        );
-    }
-
-    /// The derivatives with respect to the ends of an edge, in pixels.
-    #[inline(always)]
-    fn along(&mut self, edge: &Edge) -> [[f64; 2]; 2] {
-        let mut by = [[0.0; 2]; 2];
-        let (width, most) = (self.samples.width, self.samples.width * COLUMNS);
-        for row in edge.rows(self.samples.rows) {
-            let column = first(edge.at(row), most);
-            if column == 0 || column == most {
-                continue;
-            }
-            let sides = [column - 1, column].map(|column| self.samples.has(row, column));
-            let (at, bit) = (row * width + column / COLUMNS, 1 << (column % COLUMNS));
-            if sides[0] == sides[1] || self.found[at] & bit != 0 {
-                continue;
-            }
-            self.found[at] |= bit;
-            // What an edge gains by a pixel to the right.
-            let gain = self.gain.get(row / ROWS * width + column / COLUMNS).copied().unwrap_or(0.0);
-            let gain = if sides[0] { gain } else { -gain } / ROWS as f64;
-            let share = (row as f64 - edge.from[1]) / (edge.to[1] - edge.from[1]);
-            // Of x by y, in pixels.
-            let slope = edge.slope * (ROWS as f64 / COLUMNS as f64);
-            for (by, share) in by.iter_mut().zip([1.0 - share, share]) {
-                *by = [by[0] + gain * share, by[1] - gain * share * slope];
-            }
-        }
-        by
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::View;
+    use crate::geom::Affine;
     use crate::render::testing::{cuboid, sphere};
+    use crate::render::{Channels, View};
     use glam::{DVec3, Vec3};
     use proptest::prelude::*;
 
@@ -362,6 +262,16 @@ mod tests {
         nothing.add(&[point(1.0, 1.0), point(2.0, 1.0), point(5.0, 1.0)]);
         nothing.add(&[point(1e300, 1.0), point(1e300, 3.0), point(2e300, 2.0)]);
         assert!(nothing.fractions().iter().all(|f| *f == 0.0));
+    }
+
+    #[test]
+    fn large_pictures_take_bounded_memory() {
+        let camera = Camera::default_for(1200, 1200);
+        assert!(Fractions::of(&sphere(24, 12), &camera).is_none());
+        let view = View::new(sphere(24, 12), camera);
+        let mask: Vec<f32> = view.depth(1200).mask().map(|m| f32::from(u8::from(m))).collect();
+        assert_eq!(view.fractions(1200)[..], mask[..]);
+        assert!(view.vjp_fractions(1200, &vec![1.0; 1200 * 1200]).iter().any(|g| g.x != 0.0));
     }
 
     proptest! {
