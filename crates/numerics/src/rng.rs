@@ -13,6 +13,7 @@
 //! assert_eq!(a.next_u64(), b.next_u64());
 //! assert!((0.0..1.0).contains(&a.uniform()) && a.open_uniform() > 0.0 && a.standard_normal().is_finite());
 //! assert!(a.index(6) < 6 && a.weighted(&[0.0, 2.0], 2.0) == 1);
+//! assert_eq!(a.weighted_by([0.0, 2.0].into_iter(), 2.0), 1);
 //! assert_ne!(a.sample::<f64>(rand_distr::StandardUniform), b.sample::<f64>(rand_distr::StandardUniform));
 //! ```
 
