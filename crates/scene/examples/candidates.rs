@@ -3,8 +3,8 @@
 //!
 //!     cargo run --release -p pcadlang-scene --features codecs --example candidates PICTURE …
 
-use pcadlang_scene::vision::candidates::{CandidateOptions, candidates};
 use pcadlang_scene::vision::Limits;
+use pcadlang_scene::vision::candidates::{CandidateOptions, candidates};
 use pcadlang_scene::vision::photo::load;
 use std::error::Error;
 use std::hash::{DefaultHasher, Hash, Hasher};
