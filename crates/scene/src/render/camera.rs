@@ -113,7 +113,20 @@ impl Camera {
         let by = f64::from(longer_side) / w.max(h);
         let width = ((w * by).round() as u32).clamp(1, longer_side);
         let height = ((h * by).round() as u32).clamp(1, longer_side);
-        let (bx, by_y) = (f64::from(width) / w, f64::from(height) / h);
+        self.sized(width, height, by)
+    }
+
+    /// The same view with each pixel cut into `by` by `by` pixels, `by` at least 1.
+    pub(super) fn finer(&self, by: u32) -> Camera {
+        let by = by.max(1);
+        let (width, height) = (self.width.saturating_mul(by), self.height.saturating_mul(by));
+        self.sized(width, height, f64::from(by))
+    }
+
+    /// The same view in a picture of another size, with lengths in it `by` times as long.
+    fn sized(&self, width: u32, height: u32, by: f64) -> Camera {
+        let bx = f64::from(width) / f64::from(self.width);
+        let by_y = f64::from(height) / f64::from(self.height);
         let projection = match self.projection {
             Projection::Pinhole { focal_px, cx, cy } => {
                 Projection::Pinhole { focal_px: focal_px * by, cx: cx * bx, cy: cy * by_y }
@@ -122,24 +135,6 @@ impl Camera {
                 units_per_pixel: units_per_pixel / by,
                 cx: cx * bx,
                 cy: cy * by_y,
-            },
-        };
-        Camera { width, height, projection, ..*self }
-    }
-
-    /// The same view with each pixel cut into `by` by `by` pixels, `by` at least 1.
-    pub(super) fn finer(&self, by: u32) -> Camera {
-        let by = by.max(1);
-        let (width, height) = (self.width.saturating_mul(by), self.height.saturating_mul(by));
-        let by = f64::from(by);
-        let projection = match self.projection {
-            Projection::Pinhole { focal_px, cx, cy } => {
-                Projection::Pinhole { focal_px: focal_px * by, cx: cx * by, cy: cy * by }
-            }
-            Projection::Orthographic { units_per_pixel, cx, cy } => Projection::Orthographic {
-                units_per_pixel: units_per_pixel / by,
-                cx: cx * by,
-                cy: cy * by,
             },
         };
         Camera { width, height, projection, ..*self }

@@ -157,6 +157,45 @@ mod tests {
         assert_eq!(picture(1, 2).between(&[1.0, 2.0], 0.1, 1.0), 1.5);
     }
 
+    /// Checks derivatives of a sum over a picture of `size` pixels, with respect to vertices,
+    /// against differences over `step` of five numbers that place the solid, up to 3 % of
+    /// what is added up and `chance`.
+    fn check_slopes(
+        solid: &Solid,
+        size: u32,
+        sum: impl Fn(&View) -> f64,
+        vjp: impl Fn(&View) -> Vec<DVec3>,
+        (step, chance): (f64, f64),
+    ) {
+        let at = |p: &[f64; 5]| {
+            let turn = DVec3::new(0.4 + p[2], 0.5 + p[3], 0.2);
+            let by = Affine::new(DVec3::new(p[0], p[1], 0.0), turn, DVec3::splat(1.0 + p[4]));
+            View::new(solid.placed(by), Camera::default_for(size, size))
+        };
+        let here = [0.05, -0.1, 0.0, 0.0, 0.0];
+        let found = vjp(&at(&here));
+        let vertices = |p: &[f64; 5]| at(p).solid().vertices().collect::<Vec<_>>();
+        for k in 0..5 {
+            let moved = |h: f64| {
+                let mut p = here;
+                p[k] += h;
+                p
+            };
+            let way = vertices(&moved(1e-6))
+                .into_iter()
+                .zip(vertices(&moved(-1e-6)))
+                .map(|(a, b)| (a - b) / 2e-6);
+            let terms: Vec<f64> = found.iter().zip(way).map(|(g, d)| g.dot(d)).collect();
+            let (along, gross) =
+                (terms.iter().sum::<f64>(), terms.iter().map(|t| t.abs()).sum::<f64>());
+            let slope = (sum(&at(&moved(step))) - sum(&at(&moved(-step)))) / (2.0 * step);
+            assert!(
+                (along - slope).abs() < 0.03 * gross + chance,
+                "number {k}: {along} {slope} of {gross}"
+            );
+        }
+    }
+
     #[test]
     fn sums_over_silhouettes_change_as_predicted() {
         const SIZE: u32 = 192;
@@ -168,42 +207,16 @@ mod tests {
                 1.0 + 0.01 * x + 0.005 * y + 0.5 * libm::sin(x / 30.0)
             })
             .collect();
+        let sum = |view: &View| {
+            let frame = view.depth(SIZE);
+            frame.mask().zip(&gain).map(|(m, g)| if m { *g } else { 0.0 }).sum::<f64>()
+        };
         let block = cuboid(Vec3::new(1.4, 1.0, 0.8));
         for solid in [sphere(64, 32), block] {
-            let at = |p: &[f64; 5]| {
-                let turn = DVec3::new(0.4 + p[2], 0.5 + p[3], 0.2);
-                let by = Affine::new(DVec3::new(p[0], p[1], 0.0), turn, DVec3::splat(1.0 + p[4]));
-                View::new(solid.placed(by), Camera::default_for(SIZE, SIZE))
-            };
-            let sum = |p: &[f64; 5]| {
-                let frame = at(p).depth(SIZE);
-                frame.mask().zip(&gain).map(|(m, g)| if m { *g } else { 0.0 }).sum::<f64>()
-            };
-            let here = [0.05, -0.1, 0.0, 0.0, 0.0];
-            let found = at(&here).vjp_mask(SIZE, &gain);
-            let vertices = |p: &[f64; 5]| at(p).solid().vertices().collect::<Vec<_>>();
-            for k in 0..5 {
-                let moved = |h: f64| {
-                    let mut p = here;
-                    p[k] += h;
-                    p
-                };
-                let way = vertices(&moved(1e-6))
-                    .into_iter()
-                    .zip(vertices(&moved(-1e-6)))
-                    .map(|(a, b)| (a - b) / 2e-6);
-                let terms: Vec<f64> = found.iter().zip(way).map(|(g, d)| g.dot(d)).collect();
-                let (along, gross) =
-                    (terms.iter().sum::<f64>(), terms.iter().map(|t| t.abs()).sum::<f64>());
-                let slope = (sum(&moved(0.04)) - sum(&moved(-0.04))) / 0.08;
-                // Gains on one side mostly cancel losses on the other. Pixels are either
-                // in or out: of the outline's 300, about 20 more or fewer are covered by
-                // chance, each worth about 1 to 3, over a difference of 0.08.
-                assert!(
-                    (along - slope).abs() < 0.03 * gross + 400.0,
-                    "number {k}: {along} {slope} of {gross}"
-                );
-            }
+            // Gains on one side mostly cancel losses on the other. Pixels are either
+            // in or out: of the outline's 300, about 20 more or fewer are covered by
+            // chance, each worth about 1 to 3, over a difference of 0.08.
+            check_slopes(&solid, SIZE, sum, |view| view.vjp_mask(SIZE, &gain), (0.04, 400.0));
         }
     }
 
@@ -218,40 +231,14 @@ mod tests {
                 if within { 0.5 } else { -0.6 }
             })
             .collect();
+        let sum = |view: &View| {
+            let fractions = view.fractions(SIZE);
+            fractions.iter().zip(&gain).map(|(f, g)| f64::from(*f) * g).sum::<f64>()
+        };
         let block = cuboid(Vec3::new(1.4, 1.0, 0.8));
         for solid in [sphere(96, 48), block] {
-            let at = |p: &[f64; 5]| {
-                let turn = DVec3::new(0.4 + p[2], 0.5 + p[3], 0.2);
-                let by = Affine::new(DVec3::new(p[0], p[1], 0.0), turn, DVec3::splat(1.0 + p[4]));
-                View::new(solid.placed(by), Camera::default_for(SIZE, SIZE))
-            };
-            let sum = |p: &[f64; 5]| {
-                let fractions = at(p).fractions(SIZE);
-                fractions.iter().zip(&gain).map(|(f, g)| f64::from(*f) * g).sum::<f64>()
-            };
-            let here = [0.05, -0.1, 0.0, 0.0, 0.0];
-            let found = at(&here).vjp_fractions(SIZE, &gain);
-            let vertices = |p: &[f64; 5]| at(p).solid().vertices().collect::<Vec<_>>();
-            for k in 0..5 {
-                let moved = |h: f64| {
-                    let mut p = here;
-                    p[k] += h;
-                    p
-                };
-                let way = vertices(&moved(1e-6))
-                    .into_iter()
-                    .zip(vertices(&moved(-1e-6)))
-                    .map(|(a, b)| (a - b) / 2e-6);
-                let terms: Vec<f64> = found.iter().zip(way).map(|(g, d)| g.dot(d)).collect();
-                let (along, gross) =
-                    (terms.iter().sum::<f64>(), terms.iter().map(|t| t.abs()).sum::<f64>());
-                let slope = (sum(&moved(0.003)) - sum(&moved(-0.003))) / 0.006;
-                // The outline moves by about 0.03 pixels: 8 steps of the fractions.
-                assert!(
-                    (along - slope).abs() < 0.03 * gross + 3.0,
-                    "number {k}: {along} {slope} of {gross}"
-                );
-            }
+            // The outline moves by about 0.03 pixels: 8 steps of the fractions.
+            check_slopes(&solid, SIZE, sum, |view| view.vjp_fractions(SIZE, &gain), (0.003, 3.0));
         }
     }
 
