@@ -18,6 +18,8 @@
 
 #[cfg(feature = "scene")]
 pub mod bank;
+#[cfg(feature = "cli")]
+mod cli;
 pub mod diag;
 pub mod editor;
 pub mod host;
@@ -35,6 +37,13 @@ pub mod syntax;
 pub mod trace;
 pub mod tradeoff;
 
+// The modules of the command are written as those of a program that uses this library.
+#[cfg(feature = "cli")]
+extern crate self as pcadlang;
+
+#[doc(hidden)]
+#[cfg(feature = "cli")]
+pub use cli::command;
 #[doc(no_inline)]
 #[cfg(feature = "scene")]
 pub use pcadlang_detectors::{nn, people};

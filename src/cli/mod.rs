@@ -25,14 +25,23 @@ mod term;
 mod tradeoff;
 
 use args::{Cli, Command};
-use clap::CommandFactory;
+use clap::{CommandFactory, Parser};
 use programs::{calibrate, check, doc, fmt, predict, watch};
 use reopening::{compare, film, report, show};
 use running::run;
-use std::process::ExitCode;
+use std::ffi::OsString;
 
-/// Runs a command and returns its exit code.
-pub fn main(cli: Cli) -> ExitCode {
+/// Runs the command with these arguments, the first of which is its name, and returns its exit
+/// code. It prints, and handles Ctrl-C for the whole process.
+pub fn command(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(e) => {
+            // If it cannot be printed, the code still says so.
+            let _ = e.print();
+            return u8::try_from(e.exit_code()).unwrap_or(2);
+        }
+    };
     let done = match cli.command {
         Command::Run(a) => run::run(&a),
         Command::Evaluate(a) => evaluate::evaluate(&a),
@@ -59,7 +68,7 @@ pub fn main(cli: Cli) -> ExitCode {
         Command::Report(a) => report::report(&a),
     };
     match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => ExitCode::from(term::fail(failure)),
+        Ok(()) => 0,
+        Err(failure) => term::fail(failure),
     }
 }

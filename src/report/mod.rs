@@ -20,6 +20,8 @@ pub mod evaluation;
 pub mod film;
 mod hash;
 pub mod html;
+#[doc(hidden)]
+pub mod inference;
 mod modes;
 mod moments;
 mod number;

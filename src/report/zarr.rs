@@ -8,32 +8,13 @@
 //! their names as its coordinate. `/` in names becomes `.`, as in programs.
 
 use super::ChainDraws;
-use crate::infer::draws::{Column, DrawRow, POINTWISE, Shape};
+use super::inference::{Array, Group, Numbers, Point, groups};
 use serde_json::{Map, Value, json};
-use std::collections::HashSet;
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// The name of the folder inside a run's folder.
 pub const ZARR: &str = "inference.zarr";
-
-/// The name of an observed value, and the value; NaN if it is not a number.
-pub type Point = (String, f64);
-
-/// The elements of an array.
-enum Numbers {
-    Floats(Vec<f64>),
-    Integers(Vec<i64>),
-    Truths(Vec<bool>),
-    Texts(Vec<String>),
-}
-
-/// An array of a group, with the names and lengths of its dimensions.
-struct Array {
-    name: String,
-    dims: Vec<(String, usize)>,
-    numbers: Numbers,
-}
 
 /// Writes the draws of a run's chains, which must have the same columns, with the step
 /// size of each chain's Hamiltonian kernel if it has one. Chains without draws are left
@@ -53,42 +34,7 @@ pub fn write(
     std::fs::create_dir_all(&partial)?;
     let mut store = Store { dir: partial.clone(), metadata: Map::new() };
     store.put(".zgroup", json!({ "zarr_format": 2 }))?;
-    let known = step_sizes.iter().copied().chain(std::iter::repeat(None));
-    let (chains, step_sizes): (Vec<&ChainDraws>, Vec<Option<f64>>) =
-        chains.iter().zip(known).filter(|(c, _)| !c.rows.is_empty()).unzip();
-    let draws = chains.iter().map(|c| c.rows.len()).min().unwrap_or(0);
-    let rows: Vec<&DrawRow> = chains.iter().flat_map(|c| &c.rows[..draws]).collect();
-    let dims = vec![("chain".to_owned(), chains.len()), ("draw".to_owned(), draws)];
-    let columns = chains.first().map_or(&[][..], |c| &c.columns);
-    store.group("posterior", posterior(columns, &rows, &dims))?;
-    let mut stats = sample_stats(&rows, &dims);
-    if step_sizes.iter().any(Option::is_some) {
-        let each =
-            step_sizes.iter().flat_map(|s| std::iter::repeat_n(s.unwrap_or(f64::NAN), draws));
-        let numbers = Numbers::Floats(each.collect());
-        stats.push(Array { name: "step_size".into(), dims: dims.clone(), numbers });
-    }
-    store.group("sample_stats", stats)?;
-    if let Some((at, n)) = place_of(columns, POINTWISE).filter(|(_, n)| *n == points.len()) {
-        let observation = vec![("observation".to_owned(), n)];
-        let all = |d: &[(String, usize)]| d.iter().chain(&observation).cloned().collect::<Vec<_>>();
-        let scores = rows.iter().flat_map(|r| r.values[at..at + n].to_vec()).collect();
-        let names = Numbers::Texts(points.iter().map(|p| p.0.clone()).collect());
-        let array = |dims, numbers| Array {
-            name: "observed".into(),
-            dims,
-            numbers: Numbers::Floats(numbers),
-        };
-        let coordinate =
-            Array { name: "observation".into(), dims: observation.clone(), numbers: names };
-        store.group("log_likelihood", vec![array(all(&dims), scores)])?;
-        store.save("log_likelihood", &coordinate)?;
-        store.group(
-            "observed_data",
-            vec![array(observation.clone(), points.iter().map(|p| p.1).collect())],
-        )?;
-        store.save("observed_data", &coordinate)?;
-    }
+    groups(chains, step_sizes, points).iter().try_for_each(|g| store.group(g))?;
     store.end()?;
     remove(&place)?;
     std::fs::rename(&partial, &place)
@@ -102,65 +48,6 @@ fn remove(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Returns the position of a column's numbers in a row, and how many there are.
-fn place_of(columns: &[Column], name: &str) -> Option<(usize, usize)> {
-    let before = columns.iter().position(|c| c.name == name)?;
-    Some((columns[..before].iter().map(|c| c.shape.len()).sum(), columns[before].shape.len()))
-}
-
-fn posterior(columns: &[Column], rows: &[&DrawRow], dims: &[(String, usize)]) -> Vec<Array> {
-    let (mut at, mut taken, mut all) = (0, HashSet::new(), Vec::new());
-    for c in columns {
-        let (begin, n) = (at, c.shape.len());
-        at += n;
-        if c.name == POINTWISE || n == 0 {
-            continue;
-        }
-        let name = name_of(&c.name, &mut taken);
-        let mut dims = dims.to_vec();
-        if let Shape::Vector(n) = c.shape {
-            dims.push((format!("{name}_dim_0"), n));
-        }
-        let numbers = rows.iter().flat_map(|r| r.values[begin..begin + n].to_vec()).collect();
-        all.push(Array { name, dims, numbers: Numbers::Floats(numbers) });
-    }
-    all
-}
-
-fn sample_stats(rows: &[&DrawRow], dims: &[(String, usize)]) -> Vec<Array> {
-    let array = |name: &str, numbers| Array { name: name.into(), dims: dims.to_vec(), numbers };
-    let floats = |f: fn(&DrawRow) -> f64| Numbers::Floats(rows.iter().map(|r| f(r)).collect());
-    vec![
-        array("lp", floats(|r| r.log_joint)),
-        array("log_prior", floats(|r| r.log_prior)),
-        array("log_likelihood_sum", floats(|r| r.log_likelihood)),
-        array("acceptance_rate", floats(|r| r.acceptance)),
-        array("diverging", Numbers::Truths(rows.iter().map(|r| r.divergent > 0).collect())),
-        array("step", Numbers::Integers(rows.iter().map(|r| r.step as i64).collect())),
-    ]
-}
-
-/// Converts a name to one that is valid for a folder and differs from all names taken.
-fn name_of(name: &str, taken: &mut HashSet<String>) -> String {
-    let fits = |c: char| c.is_alphanumeric() || "_.-+[]()".contains(c);
-    let plain: String = name
-        .chars()
-        .map(|c| {
-            if c == '/' {
-                '.'
-            } else if fits(c) {
-                c
-            } else {
-                '_'
-            }
-        })
-        .collect();
-    let plain =
-        if plain.is_empty() || plain.starts_with('.') { format!("_{plain}") } else { plain };
-    let mut all = std::iter::once(plain.clone()).chain((2..).map(|i| format!("{plain}_{i}")));
-    all.find(|name| taken.insert(name.to_lowercase())).unwrap_or(plain)
-}
-
 /// A folder that is being written.
 struct Store {
     dir: PathBuf,
@@ -169,22 +56,12 @@ struct Store {
 }
 
 impl Store {
-    /// Writes a group with its arrays and, for each dimension, a coordinate that counts
-    /// from 0.
-    fn group(&mut self, name: &str, arrays: Vec<Array>) -> io::Result<()> {
-        self.put(&format!("{name}/.zgroup"), json!({ "zarr_format": 2 }))?;
+    /// Writes a group with its arrays.
+    fn group(&mut self, group: &Group) -> io::Result<()> {
+        self.put(&format!("{}/.zgroup", group.name), json!({ "zarr_format": 2 }))?;
         let by = json!({ "inference_library": "pcadlang", "inference_library_version": env!("CARGO_PKG_VERSION") });
-        self.put(&format!("{name}/.zattrs"), by)?;
-        let dims: indexmap::IndexSet<&(String, usize)> =
-            arrays.iter().flat_map(|a| &a.dims).collect();
-        for (dim, n) in dims {
-            let counts = Numbers::Integers((0..*n as i64).collect());
-            self.save(
-                name,
-                &Array { name: dim.clone(), dims: vec![(dim.clone(), *n)], numbers: counts },
-            )?;
-        }
-        arrays.iter().try_for_each(|a| self.save(name, a))
+        self.put(&format!("{}/.zattrs", group.name), by)?;
+        group.arrays.iter().try_for_each(|a| self.save(&group.name, a))
     }
 
     /// Writes an array into its group.
@@ -251,6 +128,7 @@ fn texts(all: &[String]) -> (String, Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::infer::draws::{Column, DrawRow, POINTWISE};
 
     #[test]
     fn arrays_are_as_the_format_has_them() {

@@ -67,6 +67,13 @@ impl fmt::Debug for SceneView {
     }
 }
 
+/// A view that was rendered elsewhere.
+impl From<Arc<View>> for SceneView {
+    fn from(view: Arc<View>) -> SceneView {
+        SceneView(view)
+    }
+}
+
 impl SceneView {
     /// Returns argument `i` as a view.
     ///

@@ -1,0 +1,135 @@
+//! Running chains while Python stays responsive.
+//!
+//! The chains run on threads of their own without the interpreter's lock. The calling thread waits,
+//! and looks now and then whether Python was interrupted and whether progress is to be reported.
+
+use crate::model::Compiled;
+use crate::posterior::{Gathered, Posterior};
+use pcadlang::RunOptions;
+use pcadlang::bank::BankFiles;
+use pcadlang::infer::draws::Sink;
+use pcadlang::infer::{BestSoFar, Callback, Callbacks, Evidence, Progress};
+use pcadlang::report::Memory;
+use pyo3::prelude::*;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// How often the calling thread looks.
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// How many numbers are kept in memory over all chains, as by the command: 32 MiB.
+const ROOM: usize = 4 << 20;
+
+/// What is run.
+pub struct Run {
+    pub compiled: Arc<Compiled>,
+    pub chains: u32,
+    pub steps: Option<u64>,
+    pub warmup: Option<u64>,
+    pub time: Option<Duration>,
+    pub seed: u64,
+    pub threads: usize,
+    pub plan: Option<String>,
+}
+
+impl Run {
+    /// Runs the chains, and tells a function of Python how far they are. The caller must not hold
+    /// the interpreter's lock.
+    ///
+    /// # Errors
+    /// Those of the program, of its hosts, and of the function.
+    pub fn watched(&self, told: Option<&Py<PyAny>>) -> PyResult<Posterior> {
+        let model = &self.compiled.model;
+        let (begun, progress) = (Instant::now(), Arc::new(Progress::default()));
+        let best = Arc::new(BestSoFar::new(self.chains, &progress));
+        // A single chain has one mode, which needs no evidence.
+        let evidence = Arc::new(Evidence::new(if self.chains > 1 { self.chains } else { 0 }));
+        let callbacks: Vec<Arc<dyn Callback>> = vec![best.clone(), evidence.clone()];
+        let folder = Path::new(self.compiled.program.name()).parent().unwrap_or(Path::new(""));
+        let options = RunOptions {
+            seed: self.seed,
+            steps: self.steps,
+            warmup: self.warmup,
+            time: self.time,
+            limits: model.limits().clone(),
+            callback: Some(Arc::new(Callbacks::from_iter(callbacks))),
+            banks: Some(Arc::new(BankFiles::new(model, folder, None))),
+            sites: true,
+            pointwise: true,
+            ..RunOptions::default()
+        };
+        let room = ROOM / self.chains as usize;
+        let memories: Vec<Memory> = (0..self.chains).map(|_| Memory::bounded(room)).collect();
+        let sinks = memories.iter().map(|m| Box::new(m.clone()) as Box<dyn Sink>).collect();
+        let (results, failed) = std::thread::scope(|scope| {
+            let running = scope.spawn(|| {
+                self.compiled.run(self.plan.as_deref(), &options, self.threads, &progress, sinks)
+            });
+            let mut failed = None;
+            let mut told_at = Instant::now();
+            while !running.is_finished() {
+                std::thread::sleep(PAUSE);
+                let due = told_at.elapsed() >= 5 * PAUSE;
+                let looked = Python::attach(|py| {
+                    py.check_signals()?;
+                    self.compiled.check()?;
+                    told.filter(|_| due).map_or(Ok(()), |told| {
+                        told_at = Instant::now();
+                        told.call1(py, (self.counts(py, &progress, begun)?,)).map(|_| ())
+                    })
+                });
+                if let Err(e) = looked {
+                    progress.cancelled.store(true, Ordering::Relaxed);
+                    failed = failed.or(Some(e));
+                }
+            }
+            (running.join(), failed)
+        });
+        let results = match results {
+            Ok(results) => results.map_err(|e| self.compiled.raised(e)),
+            Err(panic) => std::panic::resume_unwind(panic),
+        };
+        // An interrupt keeps the draws; a failure of the caller's own function is an error.
+        let interrupted = Python::attach(|py| match failed {
+            Some(e) if e.is_instance_of::<pyo3::exceptions::PyKeyboardInterrupt>(py) => Ok(true),
+            Some(e) => Err(e),
+            None => Ok(false),
+        })?;
+        let results = results?.into_iter().collect::<Result<Vec<_>, _>>();
+        let results = results.map_err(|e| self.compiled.raised(model.chain_error(e)))?;
+        self.compiled.check()?;
+        Ok(Posterior::new(Gathered {
+            compiled: Arc::clone(&self.compiled),
+            chains: results,
+            draws: memories.iter().map(Memory::draws).collect(),
+            best: best.state(),
+            evidence,
+            seed: self.seed,
+            seconds: begun.elapsed().as_secs_f64(),
+            interrupted,
+        }))
+    }
+
+    fn counts<'py>(
+        &self,
+        py: Python<'py>,
+        progress: &Progress,
+        begun: Instant,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let best = f64::from_bits(progress.best.load(Ordering::Relaxed));
+        let counts = serde_json::json!({
+            "chains": self.chains,
+            "steps": progress.steps.load(Ordering::Relaxed),
+            "started": progress.started.load(Ordering::Relaxed),
+            "warming": progress.warming.load(Ordering::Relaxed),
+            "ended": progress.ended.load(Ordering::Relaxed),
+            "pass": progress.pass.load(Ordering::Relaxed),
+            "passes": progress.passes.load(Ordering::Relaxed),
+            "best_log_joint": best.is_finite().then_some(best),
+            "seconds": begun.elapsed().as_secs_f64(),
+        });
+        crate::values::json(py, &counts)
+    }
+}
