@@ -1,10 +1,10 @@
 """Wrong types, shapes, freed objects, threads: an exception at worst."""
 
+import contextlib
 import gc
 import random
 import resource
 import threading
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -34,7 +34,7 @@ def odd_values() -> list[Any]:
         np.zeros(0), np.zeros((3, 0)), np.zeros((2, 2, 2)), np.array("text"), np.array([object()]),
         np.array([1, 2], "u1"), np.array([True]), np.float32(3), np.int64(4),
         np.arange(10)[::-2], np.asfortranarray(np.ones((3, 3))), np.array(5.0),
-        np.ma.masked_array([1.0, 2.0], [0, 1]), range(3), {1, 2}, iter([1]), Path("x"),
+        np.ma.masked_array([1.0, 2.0], [False, True]), range(3), {1, 2}, iter([1]), Path("x"),
     ]  # fmt: skip
 
 
@@ -111,10 +111,8 @@ def test_what_python_code_returns_is_checked() -> None:
         host.distribution("d", {}, log_density=lambda x, v=value: v, sample=lambda r, v=value: v)
         host.likelihood("l", {"x": "number"}, log_density=lambda y, x, v=value: v)
         for text in texts.values():
-            try:
+            with contextlib.suppress(pcadlang.Error, TypeError, ValueError, RecursionError):
                 pcadlang.Program.parse(text).host(host).compile().sample(chains=1, steps=3)
-            except (pcadlang.Error, TypeError, ValueError, RecursionError):
-                pass
 
 
 def test_objects_outlive_what_they_came_from() -> None:
@@ -204,7 +202,7 @@ def test_memory_is_flat_over_a_thousand_calls(images: Path) -> None:
         "load": lambda: model.load(saved),
         "sample": lambda: model.sample(chains=1, steps=3, warmup=0),
         "update": lambda: trace.update({"x": 0.5}),
-        "propose": lambda: (trace.propose({"w": [0.1, 0.2]}), trace.rollback()),
+        "propose": lambda: trace.propose({"w": [0.1, 0.2]}),
         "gradient": lambda: trace.gradient(["x", "w"]),
         "choices": lambda: trace.choices(),
         "save": lambda: trace.save(),
@@ -219,5 +217,3 @@ def test_memory_is_flat_over_a_thousand_calls(images: Path) -> None:
     # The allocator may keep a little; what grows a second time leaks.
     leaks = {name: kib for name in over if (kib := grown(calls[name], 1000)) > 2048}
     assert not leaks, f"KiB over 1,000 calls: {leaks}"
-
-

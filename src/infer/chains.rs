@@ -12,7 +12,8 @@ use crate::trace::Limits;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Runs chains `0 .. chains` of a plan; `sinks` has one sink per chain. All chains run to
+/// Runs chains of a plan, numbered from [`RunOptions::first_chain`]; `sinks` has one sink per
+/// chain. All chains run to
 /// their end even if one fails. A time limit applies to all of them together: with more
 /// chains than threads, each gets its part of what is left once the data are ready.
 pub fn run_chains(
@@ -28,10 +29,10 @@ pub fn run_chains(
     let prepare = || shared.prepare(code, plan, options);
     let time = options.time.map(|t| share(code, options, t, rounds, prepare));
     let options = &RunOptions { time, ..options.clone() };
-    let run = |(chain, mut sink): (usize, Box<dyn Sink>)| {
-        run_chain(code, plan, options, progress, &mut *sink, chain as u32, &shared)
+    let run = |(chain, mut sink): (u32, Box<dyn Sink>)| {
+        run_chain(code, plan, options, progress, &mut *sink, chain, &shared)
     };
-    let work: Vec<_> = sinks.into_iter().enumerate().collect();
+    let work: Vec<_> = (options.first_chain..).zip(sinks).collect();
     in_parallel(threads, work, run)
 }
 
@@ -58,4 +59,23 @@ fn share(
     );
     prepare();
     time.saturating_sub(begun.elapsed()) / rounds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Model;
+
+    #[test]
+    fn chains_can_be_spread_over_calls() {
+        let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = 1;").unwrap();
+        let run = |first_chain, chains| {
+            let options =
+                RunOptions { seed: 3, steps: Some(50), first_chain, ..RunOptions::default() };
+            model.run(&options, chains, 2).unwrap().quantity("x").unwrap().chains
+        };
+        let together = run(0, 3);
+        assert_eq!([run(0, 1), run(1, 2)].concat(), together);
+        assert_ne!(together[0], together[1]);
+    }
 }

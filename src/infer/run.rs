@@ -39,6 +39,9 @@ pub struct RunOptions {
     /// Whether to record the log density of each observed value with every draw, as the
     /// column `log_lik`, if there are at most 1000 of them.
     pub pointwise: bool,
+    /// The number of the first chain. Chains with the same seed and number have the same
+    /// draws, so that the chains of a run can be spread over several calls or machines.
+    pub first_chain: u32,
 }
 
 impl Default for RunOptions {
@@ -54,6 +57,7 @@ impl Default for RunOptions {
             banks: None,
             sites: false,
             pointwise: false,
+            first_chain: 0,
         }
     }
 }

@@ -308,6 +308,7 @@ pub fn options(job: &Job, ready: &Ready, callback: Option<Arc<dyn Callback>>) ->
         ))),
         sites: true,
         pointwise: true,
+        first_chain: 0,
     }
 }
 

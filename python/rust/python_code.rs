@@ -6,7 +6,7 @@
 use crate::errors::OutsideDomain;
 use crate::trace::Trace;
 use crate::values::{
-    adjoint_from_python, adjoint_to_python, datum, from_python, numbers, to_python,
+    adjoint_from_python, adjoint_to_python, datum, elements, from_python, numbers, to_python,
 };
 use pcadlang::Value;
 use pcadlang::host::{
@@ -29,6 +29,11 @@ impl Failure {
     fn keep(&self, e: PyErr) {
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         kept.get_or_insert(e);
+    }
+
+    /// Whether there is one.
+    pub fn is_some(&self) -> bool {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).is_some()
     }
 
     /// Takes the exception, so that it is raised once.

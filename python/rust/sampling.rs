@@ -4,12 +4,14 @@
 //! and looks now and then whether Python was interrupted and whether progress is to be reported.
 
 use crate::model::Compiled;
-use crate::posterior::{Gathered, Posterior};
+use crate::posterior::{Gathered, Posterior, predictive};
+use crate::trace::Trace;
 use pcadlang::RunOptions;
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::Sink;
-use pcadlang::infer::{BestSoFar, Callback, Callbacks, Evidence, Progress};
+use pcadlang::infer::{BestSoFar, BestState, Callback, Callbacks, Evidence, Progress};
 use pcadlang::report::Memory;
+use pcadlang::trace;
 use pyo3::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
@@ -22,6 +24,14 @@ const PAUSE: Duration = Duration::from_millis(20);
 /// How many numbers are kept in memory over all chains, as by the command: 32 MiB.
 const ROOM: usize = 4 << 20;
 
+/// Who is told how far a run is.
+pub struct Told {
+    /// The function of Python.
+    pub call: Py<PyAny>,
+    /// How often it also gets the best state so far.
+    pub live: Option<Duration>,
+}
+
 /// What is run.
 pub struct Run {
     pub compiled: Arc<Compiled>,
@@ -30,6 +40,7 @@ pub struct Run {
     pub warmup: Option<u64>,
     pub time: Option<Duration>,
     pub seed: u64,
+    pub first_chain: u32,
     pub threads: usize,
     pub plan: Option<String>,
 }
@@ -40,12 +51,16 @@ impl Run {
     ///
     /// # Errors
     /// Those of the program, of its hosts, and of the function.
-    pub fn watched(&self, told: Option<&Py<PyAny>>) -> PyResult<Posterior> {
+    pub fn watched(&self, told: Option<&Told>) -> PyResult<Posterior> {
         let model = &self.compiled.model;
         let (begun, progress) = (Instant::now(), Arc::new(Progress::default()));
-        let best = Arc::new(BestSoFar::new(self.chains, &progress));
+        let best = Arc::new(BestSoFar::new(self.first_chain + self.chains, &progress));
         // A single chain has one mode, which needs no evidence.
-        let evidence = Arc::new(Evidence::new(if self.chains > 1 { self.chains } else { 0 }));
+        let evidence = Arc::new(Evidence::new(if self.chains > 1 {
+            self.first_chain + self.chains
+        } else {
+            0
+        }));
         let callbacks: Vec<Arc<dyn Callback>> = vec![best.clone(), evidence.clone()];
         let folder = Path::new(self.compiled.program.name()).parent().unwrap_or(Path::new(""));
         let options = RunOptions {
@@ -58,6 +73,7 @@ impl Run {
             banks: Some(Arc::new(BankFiles::new(model, folder, None))),
             sites: true,
             pointwise: true,
+            first_chain: self.first_chain,
             ..RunOptions::default()
         };
         let room = ROOM / self.chains as usize;
@@ -68,17 +84,25 @@ impl Run {
                 self.compiled.run(self.plan.as_deref(), &options, self.threads, &progress, sinks)
             });
             let mut failed = None;
-            let mut told_at = Instant::now();
+            let (mut told_at, mut drawn_at) = (begun, begun);
             while !running.is_finished() {
                 std::thread::sleep(PAUSE);
+                if self.compiled.has_failed() {
+                    progress.cancelled.store(true, Ordering::Relaxed);
+                }
                 let due = told_at.elapsed() >= 5 * PAUSE;
                 let looked = Python::attach(|py| {
                     py.check_signals()?;
-                    self.compiled.check()?;
-                    told.filter(|_| due).map_or(Ok(()), |told| {
-                        told_at = Instant::now();
-                        told.call1(py, (self.counts(py, &progress, begun)?,)).map(|_| ())
-                    })
+                    let Some(told) = told.filter(|_| due) else { return Ok(()) };
+                    told_at = Instant::now();
+                    let counts = self.counts(py, &progress, begun)?;
+                    if told.live.is_some_and(|every| drawn_at.elapsed() >= every)
+                        && let Some(best) = best.state()
+                    {
+                        counts.set_item("best", self.state(py, &best)?)?;
+                        drawn_at = Instant::now();
+                    }
+                    told.call.call1(py, (counts,)).map(|_| ())
                 });
                 if let Err(e) = looked {
                     progress.cancelled.store(true, Ordering::Relaxed);
@@ -110,6 +134,18 @@ impl Run {
             seconds: begun.elapsed().as_secs_f64(),
             interrupted,
         }))
+    }
+
+    /// A state of the run as a trace.
+    fn state(&self, py: Python<'_>, best: &BestState) -> PyResult<Trace> {
+        let model = &self.compiled.model;
+        let built = py.detach(|| {
+            let (code, limits) = (Arc::clone(model.code()), model.limits().clone());
+            let choices = best.choices.iter().cloned();
+            trace::Trace::generate(code, choices, predictive(self.seed), limits)
+        });
+        let (trace, _) = built.map_err(|e| self.compiled.raised(model.run_error(*e)))?;
+        Ok(Trace::new(trace, &self.compiled, self.seed))
     }
 
     fn counts<'py>(

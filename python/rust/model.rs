@@ -3,7 +3,7 @@
 use crate::errors::{plain, raised};
 use crate::posterior::Posterior;
 use crate::python_code::Failure;
-use crate::sampling::Run;
+use crate::sampling::{Run, Told};
 use crate::trace::Trace;
 use crate::values::datum;
 use pcadlang::host::Datum;
@@ -49,6 +49,11 @@ impl Compiled {
     /// Converts an error of the program.
     pub fn raised(&self, e: pcadlang::Error) -> PyErr {
         caused(&self.failures, e)
+    }
+
+    /// Whether a host's code raised an exception that nobody has seen.
+    pub fn has_failed(&self) -> bool {
+        self.failures.iter().any(|f| f.is_some())
     }
 
     /// The exception that a host's code raised where the engine has no place for one.
@@ -145,9 +150,11 @@ impl Model {
     ///
     /// The draws depend on the seed and the steps alone, and are those of the command, bit for bit.
     /// `time` in seconds ends a run early; `plan` is an `infer` block in place of the program's
-    /// own. `progress` is called about ten times a second with a dictionary of counts; Ctrl-C
-    /// ends the run and keeps the draws.
-    #[pyo3(signature = (*, chains = 4, steps = None, warmup = None, time = None, seed = 0, threads = None, plan = None, progress = None))]
+    /// own. Chains are numbered from `first_chain`: one with the same seed and number has the same
+    /// draws in any run. `progress` is called about ten times a second with a dictionary of counts,
+    /// and every `live` seconds the best state so far in it as `best`. Ctrl-C ends the run and
+    /// keeps the draws.
+    #[pyo3(signature = (*, chains = 4, steps = None, warmup = None, time = None, seed = 0, first_chain = 0, threads = None, plan = None, progress = None, live = None))]
     #[allow(clippy::too_many_arguments)] // They are the keywords of one Python function.
     fn sample(
         &self,
@@ -157,25 +164,25 @@ impl Model {
         warmup: Option<u64>,
         time: Option<f64>,
         seed: u64,
+        first_chain: u32,
         threads: Option<usize>,
         plan: Option<String>,
         progress: Option<Py<PyAny>>,
+        live: Option<f64>,
     ) -> PyResult<Posterior> {
         if chains == 0 {
             return Err(PyValueError::new_err("at least one chain is needed"));
         }
-        let time = match time.map(Duration::try_from_secs_f64) {
-            Some(Err(_)) => {
-                return Err(PyValueError::new_err("a time limit is a positive number of seconds"));
-            }
-            Some(Ok(time)) => Some(time),
-            None => None,
-        };
+        if first_chain.checked_add(chains).is_none() {
+            return Err(PyValueError::new_err("chains are numbered below 2^32"));
+        }
+        let (time, live) = (seconds("time", time)?, seconds("live", live)?);
         let machine = || std::thread::available_parallelism().map_or(1, usize::from);
         let threads = threads.unwrap_or_else(machine).max(1);
         let compiled = Arc::clone(&self.0);
-        let run = Run { compiled, chains, steps, warmup, time, seed, threads, plan };
-        py.detach(|| run.watched(progress.as_ref()))
+        let run = Run { compiled, chains, steps, warmup, time, seed, first_chain, threads, plan };
+        let told = progress.map(|call| Told { call, live });
+        py.detach(|| run.watched(told.as_ref()))
     }
 
     /// The text of the main file.
@@ -208,4 +215,9 @@ impl Model {
 pub fn address_of(text: &str) -> PyResult<Address> {
     let whole = if text.starts_with('@') { text.to_owned() } else { format!("@{text}") };
     whole.parse().map_err(|e| plain(format!("{text:?}: {e}")))
+}
+
+fn seconds(name: &str, given: Option<f64>) -> PyResult<Option<Duration>> {
+    let read = given.map(Duration::try_from_secs_f64).transpose();
+    read.map_err(|_| PyValueError::new_err(format!("{name} is a positive number of seconds")))
 }

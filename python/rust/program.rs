@@ -75,7 +75,7 @@ impl Program {
         let mut picture = None;
         let mut later = Vec::new();
         for (name, value) in data.into_iter().flatten() {
-            let (name, kind) = named(&program, &name.extract::<String>()?);
+            let (name, kind) = named(&program, &name.extract::<String>()?)?;
             let path = value.extract::<PathBuf>().ok();
             match (kind.as_deref(), path) {
                 (Some("keypoints"), path) => later.push((name, path, value)),
@@ -169,7 +169,10 @@ impl Program {
 }
 
 /// The data item that a name means, with its kind.
-fn named(program: &pcadlang::Program, name: &str) -> (String, Option<String>) {
+///
+/// # Errors
+/// If the program has no such item.
+fn named(program: &pcadlang::Program, name: &str) -> PyResult<(String, Option<String>)> {
     let data = program.interface().data;
     let known = data.iter().find(|d| d.name == name).or_else(|| {
         let kind = if name == "photo" { "image" } else { name };
@@ -177,9 +180,12 @@ fn named(program: &pcadlang::Program, name: &str) -> (String, Option<String>) {
         fit.next().filter(|_| fit.next().is_none())
     });
     match known {
-        Some(item) => (item.name.clone(), item.ty.clone()),
-        // Compiling reports it.
-        None => (name.to_owned(), None),
+        Some(item) => Ok((item.name.clone(), item.ty.clone())),
+        None => {
+            let all: Vec<&str> = data.iter().map(|d| d.name.as_str()).collect();
+            let all = if all.is_empty() { "none".to_owned() } else { all.join(", ") };
+            Err(plain(format!("the program has no data item `{name}`; it has: {all}")))
+        }
     }
 }
 

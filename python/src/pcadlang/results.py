@@ -1,0 +1,68 @@
+"""Results in the forms that other libraries expect. Each is imported when it is needed."""
+
+from typing import TYPE_CHECKING, Any
+
+from pcadlang._native import Posterior, Solid, Trace, View
+
+if TYPE_CHECKING:
+    import numpy
+    import numpy.typing
+
+
+def to_arviz(posterior: Posterior) -> Any:
+    """The posterior as ArviZ has it, with coordinates.
+
+    The groups are `posterior`, `sample_stats` and, with observations, `log_likelihood` and
+    `observed_data`: those that the command writes as `inference.zarr`.
+
+    Returns:
+        An `arviz.InferenceData`; with ArviZ 1 and later, an `xarray.DataTree`.
+
+    Raises:
+        ImportError: if ArviZ is not installed (`pip install pcadlang[arviz]`).
+    """
+    import arviz
+    import xarray
+
+    from pcadlang._native import __version__
+
+    about = {"inference_library": "pcadlang", "inference_library_version": __version__}
+    groups: dict[str, Any] = {}
+    for name, arrays in posterior.groups().items():
+        coordinates = {n: v for n, (dims, v) in arrays.items() if dims == [n]}
+        variables = {n: (dims, v) for n, (dims, v) in arrays.items() if n not in coordinates}
+        groups[name] = xarray.Dataset(variables, coords=coordinates, attrs=about)
+    if hasattr(arviz, "InferenceData"):
+        return arviz.InferenceData(**groups)
+    return xarray.DataTree.from_dict(groups)
+
+
+def to_trimesh(solid: Solid) -> Any:
+    """The solid as a `trimesh.Trimesh`, in scene units, y up.
+
+    Raises:
+        ImportError: if trimesh is not installed (`pip install pcadlang[meshes]`).
+    """
+    import trimesh
+
+    vertices, triangles = solid.mesh()
+    return trimesh.Trimesh(vertices=vertices, faces=triangles, process=False)
+
+
+def picture(
+    of: View | Trace | Posterior, photo: "numpy.typing.NDArray[numpy.uint8] | None" = None
+) -> Any:
+    """The scene drawn over a photograph, as a picture of PIL.
+
+    Args:
+        of: A view, or the trace or posterior (its best state) that has one.
+        photo: height x width x 3 bytes.
+
+    Raises:
+        ImportError: if Pillow is not installed (`pip install pcadlang[pictures]`).
+    """
+    import PIL.Image
+
+    trace = of.best if isinstance(of, Posterior) else of
+    view = trace.view() if isinstance(trace, Trace) else trace
+    return PIL.Image.fromarray(view.overlay(photo))
