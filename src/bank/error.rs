@@ -39,6 +39,9 @@ pub enum BankError {
         /// The hash of the current program.
         expected: String,
     },
+    /// Banks that cannot be joined.
+    #[error("{0}")]
+    Parts(String),
     /// The observations that the features need are missing.
     #[error("{0}")]
     Observed(String),

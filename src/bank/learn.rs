@@ -25,6 +25,9 @@ const RETRIES: u64 = 100;
 pub struct Learn<'a> {
     /// The program's name, for the error messages of later runs.
     pub name: &'a str,
+    /// The number of the first entry; above 0 for a part of a bank that [`join`](super::join)
+    /// completes.
+    pub first: u64,
     /// The number of entries.
     pub count: u64,
     /// The seed, which determines the bank.
@@ -53,9 +56,9 @@ pub fn learn(model: &Model, how: &Learn, path: &Path, done: &AtomicU64) -> Resul
     let features = how.features.clone().named(&first);
     let mut writer = BankWriter::create(path, how.count, how.features.of(&first)?.len())?;
     let renderer = Cores::new(how.threads);
-    let mut from = 0;
-    while from < how.count {
-        let to = (from + BLOCK).min(how.count);
+    let (mut from, end) = (how.first, how.first + how.count);
+    while from < end {
+        let to = (from + BLOCK).min(end);
         let draw = |i: u64| {
             let scene = one(&prior, operand, how, i);
             done.fetch_add(1, Ordering::Relaxed);

@@ -90,7 +90,8 @@ pub enum Command {
 /// What a program is given.
 #[derive(Args, Clone, Debug)]
 pub struct Inputs {
-    /// The program: a file, or the name of a shipped one such as lathe.pcad
+    /// The program: a file, the name of a shipped one such as lathe.pcad, or - for the
+    /// standard input
     #[arg(value_name = "PROG", value_hint = ValueHint::FilePath, value_parser = program_name)]
     pub program: String,
     /// Set a `param`; the value is written as in a program; may be repeated
@@ -258,6 +259,9 @@ pub struct Run {
     /// Print the summary as JSON
     #[arg(long)]
     pub json: bool,
+    /// Print each draw as a line of JSON as soon as it is made, and no tables
+    #[arg(long)]
+    pub stream: bool,
     /// Print nothing but errors
     #[arg(long)]
     pub quiet: bool,
@@ -396,6 +400,12 @@ pub struct Learn {
     /// The number of scenes
     #[arg(short, default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
     pub n: u32,
+    /// The number of the first scene, for a part of a bank
+    #[arg(long, default_value_t = 0, value_name = "K")]
+    pub first: u32,
+    /// Join these parts, drawn with --first, instead of drawing scenes
+    #[arg(long, value_name = "BANK", num_args = 1.., conflicts_with_all = ["n", "first"])]
+    pub join: Vec<PathBuf>,
     /// The bank to write
     #[arg(short, long, value_name = "BANK")]
     pub out: PathBuf,

@@ -12,6 +12,9 @@ use std::time::Instant;
 /// Draws scenes and writes the bank.
 pub fn learn(a: &Learn) -> Result<(), Failure> {
     let begun = Instant::now();
+    if !a.join.is_empty() {
+        return bank::join(&a.join, &a.out).map_err(|e| told(a, e));
+    }
     let model = inputs::program(&a.inputs, a.quiet)?.without_data().compile()?;
     let size = a.features_size;
     let features = match (&a.features_from, a.features) {
@@ -21,6 +24,7 @@ pub fn learn(a: &Learn) -> Result<(), Failure> {
     };
     let how = bank::Learn {
         name: &a.inputs.program,
+        first: u64::from(a.first),
         count: u64::from(a.n),
         seed: a.seed,
         threads: a.threads.map_or_else(job::machine_threads, |n| n as usize),
@@ -35,8 +39,7 @@ pub fn learn(a: &Learn) -> Result<(), Failure> {
     });
     learnt.map_err(|e| match e {
         BankError::Run(e) => Failure::from(model.run_error(*e)),
-        BankError::Io(e) => plain(format!("cannot write {}: {}", a.out.display(), reason(&e))),
-        other => plain(other.to_string()),
+        other => told(a, other),
     })?;
     if !a.quiet {
         let took = seconds(begun.elapsed().as_secs_f64());
@@ -48,4 +51,12 @@ pub fn learn(a: &Learn) -> Result<(), Failure> {
         );
     }
     Ok(())
+}
+
+/// Names the file that cannot be written.
+fn told(a: &Learn, e: BankError) -> Failure {
+    match e {
+        BankError::Io(e) => plain(format!("cannot write {}: {}", a.out.display(), reason(&e))),
+        other => plain(other.to_string()),
+    }
 }

@@ -302,3 +302,22 @@ fn a_bank_that_is_not_there_is_an_error_at_the_kernel() {
         "no neighbours: draws from the prior"
     );
 }
+
+#[test]
+fn parts_drawn_apart_are_joined_to_the_same_bank() {
+    let f = small("bank-parts");
+    let learn = |options: &[&str]| {
+        let all = [&["learn", "small.pcad", "--features-size", "64"], options].concat();
+        f.succeeds(&all);
+    };
+    learn(&["-n", "12", "-o", "whole.bank"]);
+    learn(&["-n", "5", "-o", "a.bank"]);
+    learn(&["-n", "7", "--first", "5", "-o", "b.bank"]);
+    learn(&["--join", "a.bank", "b.bank", "-o", "joined.bank"]);
+    let bytes = |name: &str| std::fs::read(f.path().join(name)).unwrap();
+    assert_eq!(bytes("joined.bank"), bytes("whole.bank"));
+    f.refuses(
+        &["learn", "small.pcad", "--join", "a.bank", "none.bank", "-o", "joined.bank"],
+        "none.bank",
+    );
+}

@@ -357,3 +357,26 @@ infer { warmup 20 { drift(one($place)); } repeat 60 { drift(one($place)); block(
     );
     assert_eq!(radius["one_proposal_draws"]["meshes_drawn"], 1);
 }
+
+#[test]
+fn a_run_in_a_pipe() {
+    let f = Folder::new("pipe");
+    let program = "assume x ~ normal(0, 1); assume w = [x, 1]; observe normal(x, 1) = 2;";
+    let base = ["run", "-", "--seed", "1", "--steps", "40", "--chains", "2"];
+    let json = f.given(program, &[&base[..], &["--json"]].concat());
+    let said: serde_json::Value = serde_json::from_str(&json.out).unwrap();
+    assert_eq!(said["out"], "runs/stdin");
+    let streamed = f.given(program, &[&base[..], &["--stream"]].concat());
+    let lines: Vec<serde_json::Value> =
+        streamed.out.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    for chain in 0..2 {
+        let own: Vec<_> = lines.iter().filter(|l| l["chain"] == chain).collect();
+        let kept = f.read(&format!("runs/stdin/chain-{}.csv", chain + 1));
+        let rows = kept.lines().filter(|l| !l.starts_with('#')).count() - 1;
+        assert!(own.len() == rows && rows > 10, "{} lines, {rows} rows", own.len());
+        for (i, line) in own.iter().enumerate() {
+            assert_eq!(line["draw"], i);
+            assert_eq!(line["values"]["w"][0], line["values"]["x"]);
+        }
+    }
+}

@@ -68,11 +68,17 @@ impl Folder {
 
     /// Runs the command in this folder, with a limit of two minutes.
     pub fn run(&self, args: &[&str]) -> Done {
+        self.run_given("", args)
+    }
+
+    /// [`Folder::run`] with a text on its standard input.
+    fn run_given(&self, stdin: &str, args: &[&str]) -> Done {
         let mut c = Command::cargo_bin("pcadlang").unwrap();
         c.current_dir(&self.0)
             .env("NO_COLOR", "1")
             .env_remove("RUST_BACKTRACE")
             .env_remove("COLUMNS")
+            .write_stdin(stdin)
             .timeout(Duration::from_secs(120));
         let o = c.args(args).output().unwrap();
         let text = |b: &[u8]| String::from_utf8_lossy(b).into_owned();
@@ -115,7 +121,12 @@ impl Folder {
 
     /// Runs a command that must succeed.
     pub fn succeeds(&self, args: &[&str]) -> Done {
-        let d = self.run(args);
+        self.given("", args)
+    }
+
+    /// Runs a command that must succeed, with a text on its standard input.
+    pub fn given(&self, stdin: &str, args: &[&str]) -> Done {
+        let d = self.run_given(stdin, args);
         assert_eq!(d.code, 0, "{args:?}: {}{}", d.out, d.err);
         d
     }

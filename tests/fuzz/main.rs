@@ -111,6 +111,7 @@ static A_BANK: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let f = folder::Folder::new("fuzz_bank");
     let path = f.path().join("x.bank");
     let how = Learn {
+        first: 0,
         name: "x",
         count: 3,
         seed: 1,

@@ -229,7 +229,14 @@ impl<'a> Evaluation<'a> {
             let _ = job::record_failure(&dir, &t.record, failure, begun.elapsed().as_secs_f64());
         })?;
         let live = !(self.a.quiet || self.a.json);
-        let manner = RunMode { live, checkpoint: CHECKPOINT, resume: false, keep: 0, follow: None };
+        let manner = RunMode {
+            live,
+            checkpoint: CHECKPOINT,
+            resume: false,
+            keep: 0,
+            follow: None,
+            stream: false,
+        };
         job::perform(&t.job, &ready, &dir, &t.record, &self.interrupt, manner).map(|_| ())
     }
 

@@ -11,11 +11,25 @@ use pcadlang::scene::{self, ImageValue};
 use pcadlang::standard;
 use pcadlang::trace::Limits as Bounds;
 use pcadlang::vision::ContourMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// The name of a program that comes from the standard input.
+pub const STDIN: &str = "-";
+
+/// Reads a program from the standard input. It may read files below the current folder.
+fn typed(allowed: &[PathBuf]) -> Result<Program, Failure> {
+    let text = std::io::read_to_string(std::io::stdin())
+        .map_err(|e| plain(format!("cannot read the standard input: {e}")))?;
+    let program = Program::named("<stdin>", &text)?;
+    Ok(allowed.iter().try_fold(program, |p, folder| p.allow_read(folder))?)
+}
 
 /// Opens the program, with its parameters and camera.
 pub fn program(inputs: &Inputs, quiet: bool) -> Result<Program, Failure> {
-    let mut program = Program::open_allowing(&inputs.program, &inputs.allowed.allow_read)?;
+    let mut program = match &*inputs.program {
+        STDIN => typed(&inputs.allowed.allow_read)?,
+        path => Program::open_allowing(path, &inputs.allowed.allow_read)?,
+    };
     if !quiet {
         for path in
             program.embedded().iter().filter(|p| p.ends_with(".pcad") && !p.starts_with("std/"))

@@ -16,6 +16,7 @@ use crate::cli::running::keypoints::{Joints, coco};
 use crate::cli::running::places::{best_of_each, show_places};
 use crate::cli::running::progress::{self, Ending};
 use crate::cli::running::ready::Ready;
+use crate::cli::running::stream::Streamed;
 use crate::cli::running::watched::Watched;
 use crate::cli::running::{files, inputs};
 use crate::cli::{edges, people};
@@ -162,8 +163,11 @@ fn folder(program: &str) -> &Path {
     Path::new(program).parent().unwrap_or(Path::new(""))
 }
 
-/// Returns the name of a program without folder and extension.
+/// Returns the name of a program without folder and extension; `stdin` for the standard input.
 pub fn stem(path: &str) -> &str {
+    if path == inputs::STDIN {
+        return "stdin";
+    }
     Path::new(path).file_stem().and_then(|s| s.to_str()).unwrap_or("run")
 }
 
@@ -256,6 +260,8 @@ pub struct RunMode {
     pub keep: u32,
     /// Where the best state is sent as it improves.
     pub follow: Option<Live>,
+    /// Whether draws are printed as they are made.
+    pub stream: bool,
 }
 
 /// Runs the chains and fills the folder. A failure is recorded in the folder, too.
@@ -340,7 +346,7 @@ fn fill(
         let states = lines.lines().filter_map(|line| serde_json::from_str(line).ok());
         trajectory.restore(states.collect());
     }
-    let sinks = sinks(dir, job, model, memories, record, manner.resume)?;
+    let sinks = sinks(dir, job, model, memories, record, &manner)?;
     let ending = Ending::default();
     interrupt.ends(progress);
     let results = std::thread::scope(|scope| {
@@ -535,7 +541,7 @@ fn sinks(
     model: &Model,
     memories: &[Memory],
     record: &Map<String, Value>,
-    resume: bool,
+    manner: &RunMode,
 ) -> Result<Vec<Box<dyn Sink>>, Failure> {
     let run = identity(record);
     let comments = [
@@ -546,11 +552,15 @@ fn sinks(
     let files = ChainFiles { dir, run: &run, comments: &comments };
     let mut sinks: Vec<Box<dyn Sink>> = Vec::new();
     for (i, memory) in memories.iter().enumerate() {
-        let chain = match resume {
+        let chain = match manner.resume {
             true => files.resume(i as u32, memory),
             false => files.begin(i as u32, memory),
         };
-        sinks.push(Box::new(chain.map_err(|e| plain(format!("{}: {e}", dir.path().display())))?));
+        let chain = chain.map_err(|e| plain(format!("{}: {e}", dir.path().display())))?;
+        sinks.push(match manner.stream {
+            true => Box::new(Streamed::new(chain)),
+            false => Box::new(chain),
+        });
     }
     Ok(sinks)
 }

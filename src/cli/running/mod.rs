@@ -14,4 +14,5 @@ pub(in crate::cli) mod ration;
 pub(in crate::cli) mod ready;
 pub(in crate::cli) mod resume;
 pub(in crate::cli) mod run;
+pub(in crate::cli) mod stream;
 pub(in crate::cli) mod watched;

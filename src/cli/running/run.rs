@@ -37,11 +37,12 @@ pub fn run(a: &Run) -> Result<(), Failure> {
         None => RunDir::fresh(runs, name).map_err(|e| plain(e.to_string()))?,
     };
     let manner = RunMode {
-        live: !(a.quiet || a.json),
+        live: !(a.quiet || a.json || a.stream),
         checkpoint: a.checkpoint,
         resume: a.resume,
         keep: a.keep,
         follow: a.live.clone(),
+        stream: a.stream,
     };
     let outcome = job::perform(job, &ready, &dir, &record, &interrupt, manner)?;
     let explained = a.explain.then(|| explain(&ready.model, &outcome, job.sampling.seed));
@@ -70,7 +71,7 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explan
         print_line!("{said}");
         return;
     }
-    if a.quiet {
+    if a.quiet || a.stream {
         return;
     }
     let modes = modes_table(&o.modes, &o.quantities);

@@ -315,8 +315,14 @@ impl Run {
             watched.progress.cancelled.store(self.stop.load(Ordering::SeqCst), Ordering::SeqCst);
             inner.record = Value::Object(record.clone());
         }
-        let manner =
-            RunMode { live: false, checkpoint: CHECKPOINT, resume, keep: KEEP, follow: None };
+        let manner = RunMode {
+            live: false,
+            checkpoint: CHECKPOINT,
+            resume,
+            keep: KEEP,
+            follow: None,
+            stream: false,
+        };
         let done = job::perform_watched(job, &ready, &dir, &record, interrupt, manner, &watched)?;
         Ok(done.interrupted)
     }
