@@ -48,7 +48,12 @@ impl Posterior {
         let mut draws = g.draws;
         // Under a time limit some chains are longer: as in the files of the command, all are cut
         // to the length of the shortest.
-        let even = draws.iter().map(|d| d.rows.len()).min().unwrap_or(0);
+        let lengths: Vec<usize> = draws.iter().map(|d| d.rows.len()).collect();
+        let even = match g.interrupted {
+            true => longest(&lengths),
+            false => lengths.iter().copied().min().unwrap_or(0),
+        };
+        draws.retain(|d| d.rows.len() >= even);
         draws.iter_mut().for_each(|d| d.rows.truncate(even));
         widen(&mut draws);
         let points = g.chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
@@ -213,7 +218,8 @@ impl Posterior {
     }
 
     fn __repr__(&self) -> String {
-        let dims = self.groups.first().and_then(|g| g.arrays.first()).map(|a| &a.dims);
+        let arrays = self.groups.first().map_or(&[][..], |g| &g.arrays[..]);
+        let dims = arrays.iter().map(|a| &a.dims).find(|d| d.len() > 1);
         let size = |i: usize| dims.and_then(|d| d.get(i)).map_or(0, |(_, n)| *n);
         let count = self.names().len();
         format!(
@@ -222,6 +228,13 @@ impl Posterior {
             size(1)
         )
     }
+}
+
+/// The length to which the chains of an interrupted run are cut: some may hardly have begun, so
+/// shorter ones are left out where more draws are kept that way.
+fn longest(lengths: &[usize]) -> usize {
+    let kept = |n: &usize| lengths.iter().filter(|l| *l >= n).count() * n;
+    lengths.iter().copied().max_by_key(|n| (kept(n), std::cmp::Reverse(*n))).unwrap_or(0)
 }
 
 /// The random numbers of values that no observation depends on, as the command draws them.

@@ -155,15 +155,16 @@ impl Run {
         begun: Instant,
     ) -> PyResult<Bound<'py, PyAny>> {
         let best = f64::from_bits(progress.best.load(Ordering::Relaxed));
+        let started = progress.started.load(Ordering::Relaxed);
         let counts = serde_json::json!({
             "chains": self.chains,
             "steps": progress.steps.load(Ordering::Relaxed),
-            "started": progress.started.load(Ordering::Relaxed),
+            "started": started,
             "warming": progress.warming.load(Ordering::Relaxed),
             "ended": progress.ended.load(Ordering::Relaxed),
             "pass": progress.pass.load(Ordering::Relaxed),
             "passes": progress.passes.load(Ordering::Relaxed),
-            "best_log_joint": best.is_finite().then_some(best),
+            "best_log_joint": (started > 0 && best.is_finite()).then_some(best),
             "seconds": begun.elapsed().as_secs_f64(),
         });
         crate::values::json(py, &counts)

@@ -5,10 +5,12 @@ use crate::model::{Compiled, address_of};
 use crate::posterior::predictive;
 use crate::scene::View;
 use crate::values::{datum, from_python, numbers, to_python};
-use numpy::PyArray1;
+use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pcadlang::infer::StepContext;
 use pcadlang::lang::error::RunError;
 use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang::scene::ImageValue;
+use pcadlang::session::observed_image;
 use pcadlang::trace::{Address, Change, Draws, Given, Target};
 use pcadlang::{bank, trace};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
@@ -427,6 +429,18 @@ impl Trace {
             "origins": origins, "terms": terms, "names": names, "values": affected.values,
         });
         crate::values::json(py, &all)
+    }
+
+    /// The photograph that the program observes: height x width x 3 bytes; None if there is none.
+    #[getter]
+    fn photo<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<u8>>>> {
+        let image = observed_image(self.here()?.code());
+        let photo = image.as_ref().and_then(|v| v.downcast::<ImageValue>()?.as_photo());
+        let array = photo.map(|p| {
+            let shape = [p.height() as usize, p.width() as usize, 3];
+            PyArray1::from_slice(py, p.rgb().as_raw()).reshape(shape)
+        });
+        array.transpose()
     }
 
     /// The view of the program: its last top-level name that is one, or the one named.

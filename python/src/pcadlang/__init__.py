@@ -62,3 +62,10 @@ __all__ = [
     "to_trimesh",
     "tradeoff",
 ]
+
+
+def load_ipython_extension(shell: object) -> None:
+    """Loads the extension of `pcadlang.notebook`: `%load_ext pcadlang`."""
+    from pcadlang.notebook import load_ipython_extension as load
+
+    load(shell)

@@ -1,6 +1,6 @@
 """Results in the forms that other libraries expect. Each is imported when it is needed."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from pcadlang._native import Posterior, Solid, Trace, View
 
@@ -9,7 +9,15 @@ if TYPE_CHECKING:
     import numpy.typing
 
 
-def to_arviz(posterior: Posterior) -> Any:
+class Grouped(Protocol):
+    """What has draws in ArviZ's groups: a `Posterior`, the chains of a cluster."""
+
+    def groups(self) -> "dict[str, dict[str, tuple[list[str], numpy.typing.NDArray[Any]]]]":
+        """The arrays of each group by name, with the names of their dimensions."""
+        ...
+
+
+def to_arviz(posterior: Grouped) -> Any:
     """The posterior as ArviZ has it, with coordinates.
 
     The groups are `posterior`, `sample_stats` and, with observations, `log_likelihood` and
@@ -56,7 +64,7 @@ def picture(
 
     Args:
         of: A view, or the trace or posterior (its best state) that has one.
-        photo: height x width x 3 bytes.
+        photo: height x width x 3 bytes; by default the one that the trace observes.
 
     Raises:
         ImportError: if Pillow is not installed (`pip install pcadlang[pictures]`).
@@ -65,4 +73,6 @@ def picture(
 
     trace = of.best if isinstance(of, Posterior) else of
     view = trace.view() if isinstance(trace, Trace) else trace
+    if photo is None and isinstance(trace, Trace):
+        photo = trace.photo
     return PIL.Image.fromarray(view.overlay(photo))
