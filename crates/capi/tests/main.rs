@@ -7,6 +7,41 @@ fn here() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
+/// A function of C: its name and the number of its parameters.
+fn functions(text: &str, before: &str) -> Vec<(String, usize)> {
+    let mut all: Vec<(String, usize)> = text
+        .split(before)
+        .skip(1)
+        .filter_map(|rest| {
+            let (name, rest) = rest.split_once('(')?;
+            let inside = rest.split_once(')')?.0.trim().trim_end_matches(',');
+            let none = inside.is_empty() || inside == "void";
+            let count = if none { 0 } else { inside.matches(',').count() + 1 };
+            Some((name.trim().to_owned(), count))
+        })
+        .filter(|(name, _)| name.chars().all(|c| c.is_alphanumeric() || c == '_'))
+        .map(|(name, count)| (name.trim_start_matches("pcad_").to_owned(), count))
+        .collect();
+    all.sort();
+    all.dedup();
+    all
+}
+
+/// The rest of the header is compared by `.ci/header`.
+#[test]
+fn the_header_declares_the_functions_of_the_code() {
+    let read = |name: &str| std::fs::read_to_string(here().join(name)).unwrap();
+    let code: String = ["src/failure.rs", "src/posterior.rs", "src/program.rs"].map(read).concat();
+    let ours = functions(&code, "extern \"C\" fn ");
+    // Comments name functions, too, without their parameters.
+    let header: String = read("include/pcadlang.h")
+        .split("/*")
+        .map(|part| part.split_once("*/").map_or(part, |(_, after)| after))
+        .collect();
+    assert_eq!(functions(&header, "pcad_"), ours);
+    assert!(ours.len() > 15);
+}
+
 /// Skipped without a C compiler; nothing else of the project needs one.
 #[test]
 fn a_program_in_c_reads_a_posterior() {
