@@ -11,6 +11,7 @@ mod sampling;
 mod scene;
 mod trace;
 mod values;
+mod waiting;
 
 use pyo3::prelude::*;
 

@@ -6,11 +6,16 @@ use crate::python_code::Failure;
 use crate::sampling::{Run, Told};
 use crate::trace::Trace;
 use crate::values::datum;
+use crate::waiting::wait;
 use pcadlang::host::Datum;
-use pcadlang::infer::run_chains;
+use pcadlang::infer::draws::Discard;
+use pcadlang::infer::{ChainResult, Progress, run_chains, run_from};
+use pcadlang::lang::code::Code;
+use pcadlang::lang::error::RunError;
 use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::trace;
 use pcadlang::trace::{Address, Constraint, Draws, SavedTrace};
+use pcadlang::{RunOptions, Value};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -64,18 +69,55 @@ impl Compiled {
         self.failures.iter().find_map(|f| f.take()).map_or(Ok(()), Err)
     }
 
+    /// Applies kernels to a state, with the seed and the number of a chain. The caller must not
+    /// hold the interpreter's lock.
+    ///
+    /// # Errors
+    /// Those of the kernels as written, of the program and of its hosts.
+    pub fn applied(
+        &self,
+        from: &trace::Trace,
+        kernels: &str,
+        times: u64,
+        (seed, chain): (u64, u32),
+    ) -> PyResult<ChainResult> {
+        let block = format!("infer {{ repeat {times} {{\n{kernels}\n}} }}");
+        let model = self.program.and("<kernels>", &block).and_then(pcadlang::Program::compile);
+        let model = model.map_err(|e| self.raised(e))?;
+        let plan = model.last_plan().ok_or_else(|| plain("this is no kernel"))?;
+        let observed: Vec<(u64, Value)> =
+            from.observed().into_iter().map(|o| (o.hash, o.value)).collect();
+        // The kernels belong to a program with one more block, the state to the one without.
+        let moved = |code: &Arc<Code>, state: &trace::Trace| {
+            let (code, limits) = (Arc::clone(code), self.model.limits().clone());
+            let mut there =
+                trace::Trace::generate(code, state.constraints(), Draws::default(), limits)?.0;
+            there.set_observed(&observed)?;
+            there.commit();
+            Ok(there)
+        };
+        let failed = |e: Box<RunError>| self.raised(model.run_error(*e));
+        let there = moved(model.code(), from).map_err(failed)?;
+        let limits = self.model.limits().clone();
+        let options = RunOptions { seed, limits, ..RunOptions::default() };
+        let progress = Progress::default();
+        let run = || run_from(model.code(), &plan, &options, &progress, &mut Discard, chain, there);
+        let (done, _) = wait(self, &progress, |_| Ok(()), run)?;
+        let mut done = done.map_err(|e| self.raised(model.chain_error(e)))?;
+        self.check()?;
+        done.last = moved(from.code(), &done.last).map_err(failed)?;
+        Ok(done)
+    }
+
     /// Runs chains by the program's own plan, or by another one written as in a program.
     pub fn run(
         &self,
         plan: Option<&str>,
-        options: &pcadlang::RunOptions,
+        options: &RunOptions,
         threads: usize,
-        progress: &pcadlang::infer::Progress,
+        progress: &Progress,
         sinks: Vec<Box<dyn pcadlang::infer::draws::Sink>>,
-    ) -> Result<
-        Vec<Result<pcadlang::infer::ChainResult, pcadlang::infer::ChainError>>,
-        pcadlang::Error,
-    > {
+    ) -> Result<Vec<Result<ChainResult, pcadlang::infer::ChainError>>, pcadlang::Error> {
         let Some(plan) = plan else {
             return self.model.run_into(options, threads, progress, sinks);
         };

@@ -293,7 +293,7 @@ pub fn support(object: &Bound<'_, PyAny>) -> PyResult<Support> {
         };
     }
     let (name, x) = object.extract::<(String, f64)>()?;
-    let count = || match x >= 1.0 && x <= 1e6 && x == x.trunc() {
+    let count = || match (1.0..=1e6).contains(&x) && x == x.trunc() {
         true => Ok(x as usize),
         false => Err(PyValueError::new_err(format!("{name}: {x} is no number of elements"))),
     };

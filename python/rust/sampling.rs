@@ -1,11 +1,9 @@
-//! Running chains while Python stays responsive.
-//!
-//! The chains run on threads of their own without the interpreter's lock. The calling thread waits,
-//! and looks now and then whether Python was interrupted and whether progress is to be reported.
+//! Runs of chains.
 
 use crate::model::Compiled;
 use crate::posterior::{Gathered, Posterior, predictive};
 use crate::trace::Trace;
+use crate::waiting::{PAUSE, wait};
 use pcadlang::RunOptions;
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::Sink;
@@ -17,9 +15,6 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
-
-/// How often the calling thread looks.
-const PAUSE: Duration = Duration::from_millis(20);
 
 /// How many numbers are kept in memory over all chains, as by the command: 32 MiB.
 const ROOM: usize = 4 << 20;
@@ -79,48 +74,23 @@ impl Run {
         let room = ROOM / self.chains as usize;
         let memories: Vec<Memory> = (0..self.chains).map(|_| Memory::bounded(room)).collect();
         let sinks = memories.iter().map(|m| Box::new(m.clone()) as Box<dyn Sink>).collect();
-        let (results, failed) = std::thread::scope(|scope| {
-            let running = scope.spawn(|| {
-                self.compiled.run(self.plan.as_deref(), &options, self.threads, &progress, sinks)
-            });
-            let mut failed = None;
-            let (mut told_at, mut drawn_at) = (begun, begun);
-            while !running.is_finished() {
-                std::thread::sleep(PAUSE);
-                if self.compiled.has_failed() {
-                    progress.cancelled.store(true, Ordering::Relaxed);
-                }
-                let due = told_at.elapsed() >= 5 * PAUSE;
-                let looked = Python::attach(|py| {
-                    py.check_signals()?;
-                    let Some(told) = told.filter(|_| due) else { return Ok(()) };
-                    told_at = Instant::now();
-                    let counts = self.counts(py, &progress, begun)?;
-                    if told.live.is_some_and(|every| drawn_at.elapsed() >= every)
-                        && let Some(best) = best.state()
-                    {
-                        counts.set_item("best", self.state(py, &best)?)?;
-                        drawn_at = Instant::now();
-                    }
-                    told.call.call1(py, (counts,)).map(|_| ())
-                });
-                if let Err(e) = looked {
-                    progress.cancelled.store(true, Ordering::Relaxed);
-                    failed = failed.or(Some(e));
-                }
+        let (mut told_at, mut drawn_at) = (begun, begun);
+        let look = |py: Python<'_>| {
+            let Some(told) = told.filter(|_| told_at.elapsed() >= 5 * PAUSE) else { return Ok(()) };
+            told_at = Instant::now();
+            let counts = self.counts(py, &progress, begun)?;
+            if told.live.is_some_and(|every| drawn_at.elapsed() >= every)
+                && let Some(best) = best.state()
+            {
+                counts.set_item("best", self.state(py, &best)?)?;
+                drawn_at = Instant::now();
             }
-            (running.join(), failed)
-        });
-        let results = match results {
-            Ok(results) => results.map_err(|e| self.compiled.raised(e)),
-            Err(panic) => std::panic::resume_unwind(panic),
+            told.call.call1(py, (counts,)).map(|_| ())
         };
-        // An interrupt keeps the draws; a failure of the caller's own function is an error.
-        let interrupted = Python::attach(|py| match failed {
-            Some(e) if e.is_instance_of::<pyo3::exceptions::PyKeyboardInterrupt>(py) => Ok(true),
-            Some(e) => Err(e),
-            None => Ok(false),
-        })?;
+        let run =
+            || self.compiled.run(self.plan.as_deref(), &options, self.threads, &progress, sinks);
+        let (results, interrupted) = wait(&self.compiled, &progress, look, run)?;
+        let results = results.map_err(|e| self.compiled.raised(e));
         let results = results?.into_iter().collect::<Result<Vec<_>, _>>();
         let results = results.map_err(|e| self.compiled.raised(model.chain_error(e)))?;
         self.compiled.check()?;

@@ -185,6 +185,8 @@ fn rgb(photo: &Bound<'_, PyAny>) -> PyResult<image::RgbImage> {
     image::RgbImage::from_raw(width, height, pixels).ok_or_else(wrong)
 }
 
+type VerticesAndTriangles<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>);
+
 /// A solid, in scene units.
 #[pyclass(frozen, module = "pcadlang")]
 pub struct Solid(pub pcadlang::geom::Solid);
@@ -199,10 +201,7 @@ impl Solid {
 impl Solid {
     /// Its mesh: n x 3 float32 positions of vertices, m x 3 uint32 triangles, counter-clockwise
     /// seen from outside.
-    fn mesh<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>)> {
+    fn mesh<'py>(&self, py: Python<'py>) -> PyResult<VerticesAndTriangles<'py>> {
         let mesh = self.meshed(py)?;
         let vertices: Vec<f32> = mesh.positions.iter().flat_map(|p| p.to_array()).collect();
         let triangles = &mesh.topology.triangles;

@@ -320,6 +320,26 @@ impl Trace {
         self.propose_changes(py, &changes)
     }
 
+    /// Applies kernels, written as in an `infer` block, such as `drift(one(@**)); slice(@x);`, and
+    /// returns what they did. Ctrl-C ends them, and what they moved stays moved.
+    #[pyo3(signature = (kernels, *, times = 1))]
+    fn apply<'py>(
+        &mut self,
+        py: Python<'py>,
+        kernels: &str,
+        times: u64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let Some(compiled) = self.compiled.clone() else {
+            return Err(PyRuntimeError::new_err("a trace that a kernel was lent has no program"));
+        };
+        let chain = self.draws().substream as u32 | 1 << 31;
+        let (seed, trace) = (self.seed, self.change()?);
+        trace.rollback();
+        let done = py.detach(|| compiled.applied(trace, kernels, times, (seed, chain)))?;
+        self.trace = Some(done.last);
+        crate::values::json(py, &serde_json::json!(done.kernels))
+    }
+
     /// The unconstrained coordinates of continuous choices, one choice after the other.
     fn coordinates<'py>(
         &self,

@@ -126,3 +126,18 @@ def test_the_same_seed_and_index_give_the_same_trace() -> None:
     model = pcadlang.Program.parse(TEXT).compile()
     assert model.simulate(seed=1, index=4).save() == model.simulate(seed=1, index=4).save()
     assert model.simulate(seed=1, index=4).save() != model.simulate(seed=1, index=5).save()
+
+
+def test_kernels_move_a_trace() -> None:
+    text = "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2 as y;"
+    trace = pcadlang.Program.parse(text).compile().simulate(seed=1)
+    trace.update({"y": -2.0})
+    drawn = []
+    for _ in range(400):
+        [kernel] = trace.apply("slice(@x);", times=5)
+        assert kernel["name"].startswith("slice") and kernel["proposals"] == 5
+        drawn.append(trace["x"])
+    assert trace["y"] == -2.0 and np.mean(drawn) == pytest.approx(-1.6, abs=0.12)
+    assert len(set(drawn)) > 390
+    with pytest.raises(pcadlang.Error, match="did you mean `slice`"):
+        trace.apply("slize(@x);")

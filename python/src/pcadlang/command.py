@@ -24,7 +24,8 @@ class CommandError(RuntimeError):
 def arguments(options: Options) -> list[str]:
     """Options as the command has them: `{"time": "5s", "quiet": True}` is `--time 5s --quiet`.
 
-    One letter is `-n`. A list repeats the option; `set={"size": 64}` is `--set size=64`. None and False leave it out.
+    One letter is `-n`. A list repeats the option; `set={"size": 64}` is `--set size=64`. None
+    and False leave it out.
     """
     out: list[str] = []
     for name, value in options.items():
