@@ -45,13 +45,13 @@ def call(name: str, of: Any) -> str:
         if p.name not in ("self", "cls")
     ]
     shown = signature.replace(parameters=kept, return_annotation=signature.empty)
-    return f"{name}{shown}"
+    return f"{name}{shown}".replace("Ellipsis", "…")
 
 
 def members(of: type) -> list[str]:
-    """The methods and properties of a class, in the order of its definition."""
+    """The methods and properties of a class, by name: their order in a class says nothing."""
     lines = []
-    for name, member in vars(of).items():
+    for name, member in sorted(vars(of).items(), key=lambda pair: pair[0].lower()):
         if name in ("__getitem__", "__setitem__", "__contains__"):
             said = {"__getitem__": "[name]", "__setitem__": "[name] = value"}
             shown = f"{of.__name__.lower()}{said[name]}" if name in said else ""
