@@ -157,7 +157,7 @@ def ended(running: list[Any]) -> list[Any]:
     if not ready:
         return []
     ready, _ = ray.wait(running, num_returns=len(running), timeout=0, fetch_local=False)
-    return ready
+    return list(ready)
 
 
 def is_lost(error: Exception) -> bool:
