@@ -18,6 +18,7 @@ pub enum Failure {
 impl Failure {
     /// Adds a hint to a plain message.
     #[must_use]
+    #[cfg(feature = "studio")]
     pub fn hint(self, hint: impl Into<String>) -> Failure {
         match self {
             Failure::Plain(message, _) => Failure::Plain(message, Some(hint.into())),

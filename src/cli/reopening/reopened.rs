@@ -100,6 +100,7 @@ impl Reopened {
     }
 
     /// Returns its folder.
+    #[cfg(feature = "studio")]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
