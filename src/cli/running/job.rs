@@ -341,6 +341,11 @@ fn fill(
         trajectory.clone(),
     ];
     let options = options(job, ready, Some(Arc::new(Callbacks::from_iter(callbacks))));
+    if manner.resume {
+        let lines = std::fs::read_to_string(dir.file(TRAJECTORY)).unwrap_or_default();
+        let states = lines.lines().filter_map(|line| serde_json::from_str(line).ok());
+        trajectory.restore(states.collect());
+    }
     let sinks = sinks(dir, job, model, memories, record, &manner)?;
     let ending = Ending::default();
     interrupt.ends(progress);

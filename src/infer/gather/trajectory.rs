@@ -40,6 +40,17 @@ impl Trajectory {
         Trajectory { program: program.into(), chains }
     }
 
+    /// Takes up the states of a run that is resumed. Checkpoints hold only how many there
+    /// were: they are written often, and the states do not change.
+    pub fn restore(&self, states: Vec<TrajectoryState>) {
+        for state in states {
+            let chain = (state.chain as usize).checked_sub(1).and_then(|c| self.chains.get(c));
+            if let Some(chain) = chain {
+                chain.lock().unwrap_or_else(PoisonError::into_inner).push(state);
+            }
+        }
+    }
+
     /// The number of states so far of all chains.
     pub fn count(&self) -> usize {
         let of = |c: &Mutex<Vec<_>>| c.lock().unwrap_or_else(PoisonError::into_inner).len();
@@ -73,13 +84,15 @@ impl Callback for Trajectory {
     }
 
     fn save(&self, chain: u32) -> Vec<u8> {
-        pack(&self.of_chain(chain as usize))
+        let states = self.chains.get(chain as usize);
+        let count = |s: &Mutex<Vec<_>>| s.lock().unwrap_or_else(PoisonError::into_inner).len();
+        pack(&states.map_or(0, count))
     }
 
     fn load(&self, chain: u32, state: &[u8]) -> Result<(), StateError> {
-        let kept: Vec<TrajectoryState> = unpack(state)?;
+        let count: usize = unpack(state)?;
         if let Some(states) = self.chains.get(chain as usize) {
-            *states.lock().unwrap_or_else(PoisonError::into_inner) = kept;
+            states.lock().unwrap_or_else(PoisonError::into_inner).truncate(count);
         }
         Ok(())
     }
@@ -106,9 +119,13 @@ mod tests {
         assert!(one.iter().all(|s| s.chain == 2) && one[0].step <= 1);
         assert!(one.windows(2).all(|w| w[1].step > w[0].step));
         assert!(one[0].log_joint < one[one.len() - 1].log_joint - 100.0, "from prior to posterior");
-        // A run is resumed from its last checkpoint, whatever its folder lacks.
+        // A run that went on after its last checkpoint is resumed from there.
         let again = Trajectory::new(2, model.hash());
-        (0..2).for_each(|c| again.load(c, &way.save(c)).unwrap());
+        let saved = [0, 1].map(|c| way.save(c));
+        let later = TrajectoryState { step: 1_000_000, ..one[0].clone() };
+        again.restore(way.all().into_iter().chain([later]).collect());
+        assert_eq!(again.count(), way.count() + 1);
+        (0..2).for_each(|c| again.load(c, &saved[c as usize]).unwrap());
         assert_eq!(again.all(), way.all());
         assert!(again.load(0, b"no state").is_err());
     }
