@@ -1,7 +1,7 @@
 //! Compiled programs.
 
 use crate::errors::{plain, raised};
-use crate::posterior::Posterior;
+use crate::posterior::{Posterior, predictive};
 use crate::python_code::Failure;
 use crate::sampling::{Run, Told};
 use crate::trace::Trace;
@@ -9,7 +9,7 @@ use crate::values::datum;
 use crate::waiting::wait;
 use pcadlang::host::Datum;
 use pcadlang::infer::draws::Discard;
-use pcadlang::infer::{ChainResult, Progress, run_chains, run_from};
+use pcadlang::infer::{BestState, ChainResult, Progress, run_chains, run_from};
 use pcadlang::lang::code::Code;
 use pcadlang::lang::error::RunError;
 use pcadlang::rng::{Purpose, StreamKey};
@@ -67,6 +67,17 @@ impl Compiled {
     /// That exception.
     pub fn check(&self) -> PyResult<()> {
         self.failures.iter().find_map(|f| f.take()).map_or(Ok(()), Err)
+    }
+
+    /// Builds a state that a run kept. The caller must not hold the interpreter's lock.
+    ///
+    /// # Errors
+    /// Those of the program and of its hosts.
+    pub fn rebuilt(&self, kept: &BestState, seed: u64) -> PyResult<trace::Trace> {
+        let (code, limits) = (Arc::clone(self.model.code()), self.model.limits().clone());
+        let choices = kept.choices.iter().cloned();
+        let built = trace::Trace::generate(code, choices, predictive(seed), limits);
+        built.map(|(trace, _)| trace).map_err(|e| self.raised(self.model.run_error(*e)))
     }
 
     /// Applies kernels to a state, with the seed and the number of a chain. The caller must not

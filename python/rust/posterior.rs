@@ -10,7 +10,7 @@ use pcadlang::infer::{BestState, ChainResult, Evidence};
 use pcadlang::report::inference::{Group, Numbers, groups};
 use pcadlang::report::{ChainDraws, Mode, Quantity, modes, quantities, table, warnings, widen};
 use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace::{self, Draws};
+use pcadlang::trace::Draws;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -22,7 +22,8 @@ pub struct Gathered {
     pub chains: Vec<ChainResult>,
     pub draws: Vec<ChainDraws>,
     pub best: Option<Arc<BestState>>,
-    pub evidence: Arc<Evidence>,
+    /// None if it cannot be told whose it is.
+    pub evidence: Option<Arc<Evidence>>,
     pub seed: u64,
     pub seconds: f64,
     pub interrupted: bool,
@@ -53,16 +54,20 @@ impl Posterior {
             true => longest(&lengths),
             false => lengths.iter().copied().min().unwrap_or(0),
         };
+        let mut step_sizes: Vec<Option<f64>> =
+            g.chains.iter().map(|c| c.kernels.iter().find_map(|k| k.step_size)).collect();
+        let mut kept = lengths.iter().map(|n| *n >= even);
+        step_sizes.retain(|_| kept.next().unwrap_or(false));
         draws.retain(|d| d.rows.len() >= even);
+        // With chains left out, places are no numbers of chains any more.
+        let evidence = g.evidence.filter(|_| draws.len() == lengths.len());
         draws.iter_mut().for_each(|d| d.rows.truncate(even));
         widen(&mut draws);
         let points = g.chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
-        let step_sizes: Vec<Option<f64>> =
-            g.chains.iter().map(|c| c.kernels.iter().find_map(|k| k.step_size)).collect();
         let quantities = quantities(&draws);
         Posterior {
             groups: groups(&draws, &step_sizes, &points),
-            modes: modes(&quantities, Some(&g.evidence)),
+            modes: modes(&quantities, evidence.as_deref()),
             every: draws.iter().map(|d| d.every).max().unwrap_or(1),
             quantities,
             compiled: g.compiled,
@@ -171,17 +176,7 @@ impl Posterior {
     #[getter]
     fn best(&self, py: Python<'_>) -> PyResult<Trace> {
         let Some(best) = &self.best else { return Err(plain("the run made no step")) };
-        let model = &self.compiled.model;
-        let built = py.detach(|| {
-            let (code, limits) = (Arc::clone(model.code()), model.limits().clone());
-            trace::Trace::generate(
-                code,
-                best.choices.iter().cloned(),
-                predictive(self.seed),
-                limits,
-            )
-        });
-        let (trace, _) = built.map_err(|e| self.compiled.raised(model.run_error(*e)))?;
+        let trace = py.detach(|| self.compiled.rebuilt(best, self.seed))?;
         Ok(Trace::new(trace, &self.compiled, self.seed))
     }
 

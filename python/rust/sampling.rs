@@ -1,15 +1,14 @@
 //! Runs of chains.
 
 use crate::model::Compiled;
-use crate::posterior::{Gathered, Posterior, predictive};
+use crate::posterior::{Gathered, Posterior};
 use crate::trace::Trace;
 use crate::waiting::{PAUSE, wait};
 use pcadlang::RunOptions;
 use pcadlang::bank::BankFiles;
 use pcadlang::infer::draws::Sink;
-use pcadlang::infer::{BestSoFar, BestState, Callback, Callbacks, Evidence, Progress};
+use pcadlang::infer::{BestSoFar, Callback, Callbacks, Evidence, Progress};
 use pcadlang::report::Memory;
-use pcadlang::trace;
 use pyo3::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
@@ -82,7 +81,8 @@ impl Run {
             if told.live.is_some_and(|every| drawn_at.elapsed() >= every)
                 && let Some(best) = best.state()
             {
-                counts.set_item("best", self.state(py, &best)?)?;
+                let state = py.detach(|| self.compiled.rebuilt(&best, self.seed))?;
+                counts.set_item("best", Trace::new(state, &self.compiled, self.seed))?;
                 drawn_at = Instant::now();
             }
             told.call.call1(py, (counts,)).map(|_| ())
@@ -99,23 +99,12 @@ impl Run {
             chains: results,
             draws: memories.iter().map(Memory::draws).collect(),
             best: best.state(),
-            evidence,
+            // Evidence is kept by the number of a chain, and modes ask by its place among all.
+            evidence: (self.first_chain == 0).then_some(evidence),
             seed: self.seed,
             seconds: begun.elapsed().as_secs_f64(),
             interrupted,
         }))
-    }
-
-    /// A state of the run as a trace.
-    fn state(&self, py: Python<'_>, best: &BestState) -> PyResult<Trace> {
-        let model = &self.compiled.model;
-        let built = py.detach(|| {
-            let (code, limits) = (Arc::clone(model.code()), model.limits().clone());
-            let choices = best.choices.iter().cloned();
-            trace::Trace::generate(code, choices, predictive(self.seed), limits)
-        });
-        let (trace, _) = built.map_err(|e| self.compiled.raised(model.run_error(*e)))?;
-        Ok(Trace::new(trace, &self.compiled, self.seed))
     }
 
     fn counts<'py>(

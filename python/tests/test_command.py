@@ -76,3 +76,16 @@ def test_an_interrupt_keeps_what_was_drawn() -> None:
     timer.join()
     assert posterior.interrupted and posterior["x"].shape[1] > 100 and posterior.seconds < 30
     assert not model.sample(chains=1, steps=10).interrupted
+
+
+def test_an_interrupt_leaves_out_chains_that_had_hardly_begun() -> None:
+    model = pcadlang.Program.parse("assume x ~ normal(0, 1); observe normal(x, 1) = 1;").compile()
+    plan = "infer { warmup 100 { nuts(@x); } repeat 1000000000 { nuts(@x); } }"
+    timer = threading.Timer(0.7, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    posterior = model.sample(chains=4, threads=1, plan=plan, seed=1)
+    timer.join()
+    chains, draws = posterior["x"].shape
+    stats = posterior.groups()["sample_stats"]
+    assert chains < 4 and draws > 100 and posterior.modes == []
+    assert stats["step_size"][1].shape == (chains, draws) and (stats["step_size"][1] > 0).all()
