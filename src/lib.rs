@@ -7,56 +7,57 @@
 //! lists follows semantic versioning and is exercised by the doc-tests; the rest is public
 //! for tests and tools, and may change at any time.
 //!
-//! The engine ([`lang`], [`trace`], [`infer`]) knows nothing of pictures. The scene is its
-//! guest: [`scene`] registers the crates `pcadlang-scene` and `pcadlang-detectors` through
-//! [`host`], as any embedding program would. Without the feature `scene` the engine is
-//! built alone.
-#![doc = include_str!("guide.md")]
-#![doc = include_str!("pictures.md")]
+//! This crate holds no code: each floor below it is a crate in `crates`, and what they
+//! promise is named here. The engine ([`lang`], [`trace`], [`infer`]) knows nothing of
+//! pictures. The scene is its guest: [`scene`] registers the crates `pcadlang-scene` and
+//! `pcadlang-detectors` through [`host`], as any embedding program would.
+#![doc = include_str!("guides/program.md")]
+#![doc = include_str!("guides/pictures.md")]
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]
 
-#[cfg(feature = "scene")]
-pub mod bank;
-#[cfg(feature = "cli")]
-mod cli;
-pub mod diag;
-pub mod editor;
-pub mod host;
-pub mod infer;
-pub mod lang;
-mod model;
-pub mod report;
-#[cfg(feature = "scene")]
-pub mod scene;
-pub mod score;
-#[cfg(feature = "scene")]
-pub mod session;
-pub mod standard;
-pub mod syntax;
-pub mod trace;
-pub mod tradeoff;
-
-// The modules of the command are written as those of a program that uses this library.
-#[cfg(feature = "cli")]
-extern crate self as pcadlang;
-
-#[doc(hidden)]
-#[cfg(feature = "cli")]
-pub use cli::command;
-#[doc(no_inline)]
-#[cfg(feature = "scene")]
+#[cfg(feature = "command")]
+pub use pcadlang_command::command;
 pub use pcadlang_detectors::{nn, people};
-use pcadlang_numerics::platform;
+pub use pcadlang_engine::lang;
+pub use pcadlang_library::{scene, shipped, standard};
 pub use pcadlang_numerics::{dist, num, rng};
-#[doc(no_inline)]
-#[cfg(feature = "scene")]
 pub use pcadlang_scene::{geom, render, vision};
+pub use pcadlang_syntax as syntax;
+pub use pcadlang_workbench::{bank, editor, score, session, tradeoff};
 
-pub use infer::RunOptions;
-#[doc(inline)]
-pub use lang::value::Value;
-pub use model::{Error, Model, Posterior, Program};
-#[cfg(feature = "scene")]
-#[doc(inline)]
-pub use render::Camera;
+pub use pcadlang_engine::lang::value::Value;
+pub use pcadlang_inference::RunOptions;
+pub use pcadlang_library::{Model, Posterior, Program};
+pub use pcadlang_scene::render::Camera;
+pub use pcadlang_syntax::diag::Error;
+
+/// Error messages with the place of the mistake.
+#[doc = include_str!("guides/diag.md")]
+pub mod diag {
+    pub use pcadlang_syntax::diag::*;
+}
+
+/// How a program that embeds the language registers what it brings.
+#[doc = include_str!("guides/host.md")]
+pub mod host {
+    pub use pcadlang_inference::host::*;
+}
+
+/// Kernels, plans, chains and diagnostics.
+#[doc = include_str!("guides/infer.md")]
+pub mod infer {
+    pub use pcadlang_inference::*;
+}
+
+/// What a run leaves: draws, tables, files, pictures, pages.
+#[doc = include_str!("guides/report.md")]
+pub mod report {
+    pub use pcadlang_report::*;
+}
+
+/// Executions of a program: choices by address, scores, updates, gradients.
+#[doc = include_str!("guides/trace.md")]
+pub mod trace {
+    pub use pcadlang_engine::trace::*;
+}

@@ -160,7 +160,7 @@ impl Host {
         Ok(())
     }
 
-    /// What `pcadlang doc` says of a name: the host's own, or the language's.
+    /// What `pcadlang doc` says of a name: the host's own, or the engine's.
     fn doc(&self, name: &str) -> Option<String> {
         self.host.doc(name)
     }

@@ -5,5 +5,4 @@
 
 pub mod nn;
 pub mod people;
-#[cfg(feature = "weights")]
 mod weights;

@@ -15,26 +15,17 @@ pub fn choose(finder: PeopleFinder) -> bool {
 /// Returns the networks of this process.
 ///
 /// # Errors
-/// If none were chosen, and none are included in the program (feature `models`).
+/// If the included ones cannot be read.
 pub fn finder() -> Result<&'static PeopleFinder, &'static str> {
     CHOSEN.get_or_init(shipped).as_ref().map_err(String::as_str)
 }
 
 /// The files of the included detection and landmark networks.
-#[cfg(feature = "weights")]
-pub fn files() -> Result<(&'static [u8], &'static [u8]), String> {
-    Ok((crate::weights::DETECTION, crate::weights::LANDMARKS))
-}
-
-/// Explains why no networks are included.
-#[cfg(not(feature = "weights"))]
-pub fn files() -> Result<(&'static [u8], &'static [u8]), String> {
-    Err("this build does not include the networks that detect people (feature `models`): give a \
-         folder with them, --models DIR"
-        .into())
+pub fn files() -> (&'static [u8], &'static [u8]) {
+    (crate::weights::DETECTION, crate::weights::LANDMARKS)
 }
 
 fn shipped() -> Result<PeopleFinder, String> {
-    let (detection, landmarks) = files()?;
+    let (detection, landmarks) = files();
     PeopleFinder::new(detection, landmarks).map_err(|e| e.to_string())
 }

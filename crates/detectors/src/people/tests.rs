@@ -176,7 +176,6 @@ fn views_count_by_how_sure_they_are_that_they_see_someone() {
     }
 }
 
-#[cfg(feature = "weights")]
 mod shipped {
     use crate::people::{FindOptions, PeopleFinder, Person};
     use pcadlang_scene::vision::{Limits, Photo, photo};

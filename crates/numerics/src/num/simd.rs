@@ -6,7 +6,6 @@
 /// Runs `work`, compiled for the processor's widest instructions where it is inlined.
 #[inline]
 pub fn vectorised<R>(work: impl FnOnce() -> R) -> R {
-    #[cfg(any(test, feature = "portable"))]
     if PORTABLE.get() {
         return work();
     }
@@ -43,13 +42,12 @@ pub fn sum_of_triples(a: &[f64], b: &[f64], c: &[f64], f: impl Fn(f64, f64, f64)
 
 const LANES: usize = 16;
 
-#[cfg(any(test, feature = "portable"))]
 thread_local! {
     static PORTABLE: std::cell::Cell<bool> = const { std::cell::Cell::new(false) };
 }
 
-/// Runs `work` as on a processor without wide instructions.
-#[cfg(any(test, feature = "portable"))]
+/// Runs `work` as on a processor without wide instructions, on this thread: for tests that both
+/// give the same bits.
 pub fn portable<R>(work: impl FnOnce() -> R) -> R {
     PORTABLE.set(true);
     let out = work();

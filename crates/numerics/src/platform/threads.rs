@@ -4,18 +4,21 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// A pool of threads. It has none in a build without the feature `threads`, or if they
-/// cannot be created.
+/// A pool of threads. It has none on WebAssembly, or if they cannot be created.
 pub struct Pool {
-    #[cfg(feature = "threads")]
+    #[cfg(not(target_family = "wasm"))]
     pool: Option<rayon::ThreadPool>,
 }
 
-#[cfg(feature = "threads")]
 impl Pool {
     /// Starts this many threads (0: one per core), which live until the pool is dropped.
     pub fn new(threads: usize) -> Pool {
-        Pool { pool: rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok() }
+        #[cfg(target_family = "wasm")]
+        let _ = threads;
+        Pool {
+            #[cfg(not(target_family = "wasm"))]
+            pool: rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok(),
+        }
     }
 
     /// Applies `one` to each item; results are in order.
@@ -24,27 +27,11 @@ impl Pool {
         items: Vec<I>,
         one: impl Fn(I) -> T + Sync + Send,
     ) -> Vec<T> {
-        use rayon::prelude::*;
-        match &self.pool {
-            Some(pool) => pool.install(|| items.into_par_iter().with_max_len(1).map(one).collect()),
-            None => items.into_iter().map(one).collect(),
+        #[cfg(not(target_family = "wasm"))]
+        if let Some(pool) = &self.pool {
+            use rayon::prelude::*;
+            return pool.install(|| items.into_par_iter().with_max_len(1).map(one).collect());
         }
-    }
-}
-
-#[cfg(not(feature = "threads"))]
-impl Pool {
-    /// Makes a pool without threads.
-    pub fn new(_threads: usize) -> Pool {
-        Pool {}
-    }
-
-    /// Applies `one` to each item in turn.
-    pub fn map<I: Send, T: Send>(
-        &self,
-        items: Vec<I>,
-        one: impl Fn(I) -> T + Sync + Send,
-    ) -> Vec<T> {
         items.into_iter().map(one).collect()
     }
 }
@@ -63,7 +50,7 @@ pub fn in_parallel<I: Send, T: Send>(
 /// a [`Pool`]: a pool's waiting thread takes up other tasks, which could need a lock that
 /// the caller holds.
 pub fn side_by_side<T: Send>(parts: impl IntoIterator<Item = T>, work: impl Fn(usize, T) + Sync) {
-    #[cfg(all(feature = "threads", not(target_family = "wasm")))]
+    #[cfg(not(target_family = "wasm"))]
     {
         let work = &work;
         std::thread::scope(|scope| {
@@ -72,7 +59,7 @@ pub fn side_by_side<T: Send>(parts: impl IntoIterator<Item = T>, work: impl Fn(u
             }
         });
     }
-    #[cfg(not(all(feature = "threads", not(target_family = "wasm"))))]
+    #[cfg(target_family = "wasm")]
     parts.into_iter().enumerate().for_each(|(i, part)| work(i, part));
 }
 

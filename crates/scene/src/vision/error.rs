@@ -28,8 +28,6 @@ pub enum VisionError {
     #[error("not a picture: the file does not start like a PNG or JPEG file{0}")]
     NotAnImage(&'static str),
     /// The build cannot decode pictures.
-    #[error("this build cannot read PNG or JPEG: it was made without the feature `codecs`")]
-    NoCodecs,
     /// The picture ends early.
     #[error("the picture is truncated: the file ends before the last pixel")]
     Truncated,

@@ -165,9 +165,6 @@ pub(crate) fn decode_dynamic(
     limits: &Limits,
 ) -> Result<(DynamicImage, Option<f64>), VisionError> {
     let format = format_of(bytes)?;
-    if !cfg!(feature = "codecs") {
-        return Err(VisionError::NoCodecs);
-    }
     // A PNG begins with its size; check it first, because the decoder may fail on an
     // absurd one before it reports the size.
     if let (ImageFormat::Png, Some(&[w0, w1, w2, w3, h0, h1, h2, h3])) = (format, bytes.get(16..24))

@@ -1,0 +1,43 @@
+//! `pcadlang contours`.
+
+use super::args::Contours;
+use super::edges;
+use super::failure::{Failure, plain};
+use super::running::files;
+use pcadlang_library::scene::DetectorValue;
+use pcadlang_report::pictures::png;
+use pcadlang_scene::vision::{FileDetector, GradientDetector};
+
+/// Detects the contours of a photograph and writes them as a map.
+pub fn contours(a: &Contours) -> Result<(), Failure> {
+    let photo = files::photo(&a.image)?;
+    let map = match &a.edges {
+        None => {
+            let by = GradientDetector::default();
+            GradientDetector { size: a.size.unwrap_or(by.size), ..by }.contours(&photo)
+        }
+        Some(spec) => {
+            let DetectorValue(detector) = edges::detector(spec)?;
+            let detector = detector.ok_or_else(|| plain(format!("{spec} is not a detector")))?;
+            let size = a.size.unwrap_or(FileDetector::SIZE);
+            if size > FileDetector::MOST {
+                let most = FileDetector::MOST;
+                return Err(plain(format!(
+                    "--size {size}: with --edges the longer side may be at most {most} pixels"
+                )));
+            }
+            let map = detector.map(&photo, size).map_err(|e| plain(format!("{spec}: {e}")))?;
+            detector.contours(&map, &photo, detector.sigma())
+        }
+    };
+    let picture = png(&map.to_image()).map_err(|e| plain(e.to_string()))?;
+    files::write(&a.out, &picture)?;
+    print_line!(
+        "{}: {} contour points in {} x {} pixels",
+        a.out.display(),
+        map.len(),
+        map.width,
+        map.height
+    );
+    Ok(())
+}

@@ -1,0 +1,44 @@
+//! The table of built-ins: every function, distribution, form and kernel with its
+//! arguments, units and doc line.
+//!
+//! Evaluation, static checks, `pcadlang doc` and the language reference all read this
+//! table. The functions are pure: equal arguments give bit-identical results on every
+//! platform.
+
+mod args;
+mod builtin;
+mod call;
+mod covariance;
+pub mod data;
+mod derivative;
+mod distributions;
+mod elementwise;
+pub mod examples;
+mod finding;
+mod forms;
+mod inference;
+mod interp;
+mod language;
+mod linear;
+mod list;
+mod log_density;
+mod math;
+mod operators;
+mod reduce;
+mod row;
+mod table;
+
+pub use builtin::{
+    ArgAdjoints, Args, Argument, Binary, Builtin, Derivative, Form, HostItem, Inference, Kind,
+    PreviousEvaluation, Reduction, Scalar, State, Text, Type, Vjp,
+};
+pub use covariance::CovarianceValue;
+pub(crate) use derivative::times;
+pub use finding::{doc, search};
+pub(crate) use reduce::dot;
+pub use row::Resume;
+pub use row::{Arg, Row, arg, function, opt};
+pub use table::{Constant, Defaults, InputHook, Table};
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -1,0 +1,359 @@
+//! Moving a trace to a point of a tape in place: the nodes take their values and scores
+//! from the tape, with the same bits that an update would give them. Nothing is
+//! invalidated, evaluated or journaled.
+
+use crate::lang::builtins::CovarianceValue;
+use crate::lang::code::{Code, Op, Operand};
+use crate::lang::tape::{Form, ScoreSums, ScoreTerms, Scored, Tape};
+use crate::lang::value::Value;
+use crate::trace::Trace;
+use crate::trace::graph::Graph;
+use crate::trace::node::*;
+use pcadlang_numerics::num::ExactSum;
+use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
+use std::sync::Arc;
+
+/// The values of choices summed out, by number, for which something holds; without any it
+/// always does.
+pub(in crate::trace) type Given = SmallVec<[(u32, u32); 2]>;
+
+/// The nodes that a tape gives values and scores. Of those that depend on choices summed
+/// out, it gives them to the nodes that exist at the values of these choices.
+#[derive(Debug, Default)]
+pub(in crate::trace) struct InPlace {
+    values: Vec<(Given, NodeId, Form)>,
+    /// What else of a node moves.
+    besides: Vec<(Given, NodeId, Besides)>,
+    /// Nodes that contribute to the score, and where their terms are on the tape.
+    scores: Vec<(Given, NodeId, Scored)>,
+    /// Those of the values, and of the scores, that are one number on the tape. Apart from
+    /// the others because there are thousands where choices are summed out of a loop.
+    number_values: Vec<OneNumber>,
+    number_scores: Vec<OneNumber>,
+    /// Terms of the prior and of the likelihood that change.
+    old: [Vec<f64>; 2],
+    new: [Vec<f64>; 2],
+    each: Vec<f64>,
+    made: Vec<Value>,
+    columns: FxHashMap<usize, Vec<f64>>,
+}
+
+/// A node and the index of a number, for one value of a choice that is summed out ([`NONE`]
+/// if it depends on none).
+#[derive(Clone, Copy, Debug)]
+struct OneNumber {
+    choice: u32,
+    value: u32,
+    node: NodeId,
+    at: u32,
+}
+
+impl OneNumber {
+    /// `None` if it depends on several choices.
+    fn new(given: &Given, node: NodeId, at: usize) -> Option<OneNumber> {
+        let at = u32::try_from(at).ok()?;
+        match given[..] {
+            [] => Some(OneNumber { choice: NONE, value: 0, node, at }),
+            [(choice, value)] => Some(OneNumber { choice, value, node, at }),
+            _ => None,
+        }
+    }
+
+    /// Whether the choice has this value.
+    #[inline]
+    fn applies(&self, values: &[usize]) -> bool {
+        self.choice == NONE || values.get(self.choice as usize) == Some(&(self.value as usize))
+    }
+}
+
+/// What a node keeps besides its value, and where that is on a tape.
+#[derive(Clone, Debug)]
+pub(in crate::trace) enum Besides {
+    /// The last evaluation of an incremental function.
+    Evaluation(Scored),
+    /// The white noise that a choice is stored as.
+    Noise(Form),
+}
+
+impl InPlace {
+    /// Adds the value of a node whose inputs move, and what moves besides it; false if the
+    /// node keeps anything else that moves.
+    pub fn add_value(
+        &mut self,
+        (graph, code): (&Graph, &Code),
+        n: NodeId,
+        given: Given,
+        form: Form,
+        besides: Option<&Besides>,
+        is_fixed: impl Fn(FrameId, Operand) -> bool,
+    ) -> bool {
+        let node = &graph.nodes[n as usize];
+        let op = graph.op(code, n);
+        let fits = match node.side.as_deref() {
+            None | Some(Side::Deps(_) | Side::Child(_) | Side::MemoCall(_)) => true,
+            // Noise that is not given stays.
+            Some(Side::Choice(_)) => true,
+            Some(Side::Total(_)) => matches!(op, Op::Observe { .. }),
+            Some(Side::Loop(_)) => match op {
+                Op::Map { over, .. } | Op::Fold { over, .. } => is_fixed(node.frame, *over),
+                _ => false,
+            },
+            Some(Side::Kept(_)) => matches!(besides, Some(Besides::Evaluation(_))),
+            Some(Side::Table(_) | Side::Memo(_)) => false,
+        };
+        if let Some(besides) = besides.filter(|_| fits) {
+            self.besides.push((given.clone(), n, besides.clone()));
+        }
+        if fits && !form.is_fixed() {
+            self.values.push((given, n, form));
+        }
+        fits
+    }
+
+    /// Adds the score of a node.
+    pub fn add_score(&mut self, n: NodeId, given: Given, scored: Scored) {
+        self.scores.push((given, n, scored));
+    }
+
+    /// Everything where the complete tape has it.
+    pub fn on(mut self, tape: &Tape) -> InPlace {
+        self.values.iter_mut().for_each(|(_, _, form)| *form = tape.place_of(form));
+        self.scores.iter_mut().for_each(|(_, _, at)| *at = tape.place_of_score(at));
+        self.besides.iter_mut().for_each(|(_, _, besides)| match besides {
+            Besides::Evaluation(call) => *call = tape.place_of_score(call),
+            Besides::Noise(form) => *form = tape.place_of(form),
+        });
+        let numbers = &mut self.number_values;
+        self.values.retain(|(given, n, form)| {
+            let Form::Num(at) = form else { return true };
+            let one = OneNumber::new(given, *n, *at);
+            numbers.extend(one);
+            one.is_none()
+        });
+        let numbers = &mut self.number_scores;
+        self.scores.retain(|(given, n, scored)| {
+            let Scored::Numbers(run, false) = scored else { return true };
+            let one = OneNumber::new(given, *n, run.start);
+            numbers.extend(one);
+            one.is_none()
+        });
+        self
+    }
+
+    /// Whether [`InPlace::apply`] can move the trace to the point of the tape's last run,
+    /// with choices that are summed out at these values.
+    pub fn fits(&mut self, graph: &Graph, code: &Code, tape: &Tape, values: &[usize]) -> bool {
+        self.made.clear();
+        self.columns.clear();
+        for (given, n, form) in &self.values {
+            if tape.numbers(form).is_none() && holds(graph, given, *n, values) {
+                let Some(value) = tape.value(form) else { return false };
+                self.made.push(value);
+            }
+        }
+        let one = |s: &OneNumber| {
+            let node = &graph.nodes[s.node as usize];
+            !s.applies(values)
+                || node.state != State::Clean
+                || takes_one(graph.op(code, s.node), node.side.as_deref())
+        };
+        self.number_scores.iter().all(one)
+            && self.scores.iter().filter(|(given, n, _)| holds(graph, given, *n, values)).all(
+                |(_, n, scored)| {
+                    let terms = tape.terms(scored, &mut self.each, &mut self.columns);
+                    let node = &graph.nodes[*n as usize];
+                    match (graph.op(code, *n), node.side.as_deref(), terms) {
+                        (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
+                            c.scores.len() == self.each.len() && c.elements != NONE
+                        }
+                        (Op::Observe { .. }, Some(Side::Total(_)), Some(_)) => true,
+                        (op, side, Some(ScoreTerms::One(_))) => takes_one(op, side),
+                        _ => false,
+                    }
+                },
+            )
+    }
+
+    /// Moves the trace to the point of the tape's last run, after [`InPlace::fits`]. The
+    /// sums of its scores where the trace is are `before`, if that is known.
+    pub fn apply(
+        &mut self,
+        graph: &mut Graph,
+        code: &Code,
+        tape: &Tape,
+        values: &[usize],
+        before: Option<&ScoreSums>,
+    ) {
+        for v in &self.number_values {
+            let node = &mut graph.nodes[v.node as usize];
+            if v.applies(values) && node.state == State::Clean {
+                let now = tape.number(v.at as usize);
+                match &mut node.value {
+                    Value::Num(x) => *x = now,
+                    other => *other = Value::Num(now),
+                }
+            }
+        }
+        let mut made = self.made.drain(..);
+        for (given, n, form) in &self.values {
+            if !holds(graph, given, *n, values) {
+                continue;
+            }
+            let value = &mut graph.nodes[*n as usize].value;
+            match (tape.numbers(form), form) {
+                (Some([x]), Form::Num(_)) => *value = Value::Num(*x),
+                (Some(xs), _) => put(value, xs),
+                (None, _) => *value = made.next().unwrap_or_default(),
+            }
+        }
+        for (given, n, besides) in &self.besides {
+            if !holds(graph, given, *n, values) {
+                continue;
+            }
+            match (graph.nodes[*n as usize].side.as_deref_mut(), besides) {
+                (Some(Side::Kept(kept)), Besides::Evaluation(call)) => {
+                    if let Some(evaluation) = tape.evaluation(call) {
+                        kept.before = Arc::clone(evaluation);
+                    }
+                }
+                (Some(Side::Choice(c)), Besides::Noise(form)) => {
+                    c.stored = tape.value(form).and_then(|noise| noise.to_datum());
+                }
+                _ => {}
+            }
+        }
+        let (mut old, mut new) = (ScoreSums::default(), ScoreSums::default());
+        for (given, n, scored) in &self.scores {
+            if !holds(graph, given, *n, values) {
+                continue;
+            }
+            if before.is_none() {
+                graph.put_scored(code, *n, &mut old.prior, &mut old.likelihood);
+            }
+            let terms = tape.terms(scored, &mut self.each, &mut self.columns);
+            let node = &mut graph.nodes[*n as usize];
+            match (node.side.as_deref_mut(), terms) {
+                (Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
+                    c.scores.copy_from_slice(&self.each)
+                }
+                (Some(Side::Total(t)), Some(ScoreTerms::Each)) => {
+                    node.score = 0.0;
+                    t.sum = ExactSum::default();
+                    self.each.iter().for_each(|s| t.sum.add(*s));
+                }
+                (Some(Side::Total(t)), Some(ScoreTerms::Sum(sum))) => {
+                    node.score = 0.0;
+                    t.sum = sum;
+                }
+                (Some(Side::Total(t)), Some(ScoreTerms::One(score))) => {
+                    node.score = score;
+                    t.sum = ExactSum::default();
+                }
+                (_, Some(ScoreTerms::One(score))) => node.score = score,
+                _ => {}
+            }
+            if before.is_none() {
+                graph.put_scored(code, *n, &mut new.prior, &mut new.likelihood);
+            }
+        }
+        drop(made);
+        self.put_number_scores((graph, code, tape), values, [&mut old, &mut new]);
+        let (new, old) = match before {
+            Some(before) => (tape.sums(), before),
+            None => (&new, &old),
+        };
+        new.replace(old, &mut graph.prior, &mut graph.likelihood);
+        graph.revision += 1;
+    }
+
+    /// Gives nodes the scores that are one number on the tape, and adds the former and the
+    /// present ones, where they differ, to the sums.
+    fn put_number_scores(
+        &mut self,
+        (graph, code, tape): (&mut Graph, &Code, &Tape),
+        values: &[usize],
+        [old, new]: [&mut ScoreSums; 2],
+    ) {
+        self.old.iter_mut().chain(&mut self.new).for_each(Vec::clear);
+        for s in &self.number_scores {
+            let node = &mut graph.nodes[s.node as usize];
+            if !s.applies(values) || node.state != State::Clean {
+                continue;
+            }
+            let score = tape.number(s.at as usize);
+            let likelihood = usize::from(!matches!(code.ops[node.op as usize], Op::Draw { .. }));
+            match node.side.as_deref_mut() {
+                Some(Side::Total(t)) => {
+                    if node.score == 0.0 {
+                        old.likelihood.merge(&t.sum);
+                    }
+                    t.sum = ExactSum::default();
+                }
+                _ if node.score.to_bits() == score.to_bits() => continue,
+                _ => {}
+            }
+            self.old[likelihood].push(node.score);
+            self.new[likelihood].push(score);
+            node.score = score;
+        }
+        for (sums, terms) in [(old, &self.old), (new, &self.new)] {
+            sums.prior.add_all(&terms[0]);
+            sums.likelihood.add_all(&terms[1]);
+        }
+    }
+}
+
+/// Whether a node with this operation and side can take a score that is one term.
+fn takes_one(op: &Op, side: Option<&Side>) -> bool {
+    match (op, side) {
+        (Op::Draw { .. }, Some(Side::Choice(c))) => c.elements == NONE,
+        (Op::Draw { .. } | Op::Observe { .. } | Op::Factor { .. }, None) => true,
+        (Op::Observe { .. }, Some(Side::Total(_))) => true,
+        _ => false,
+    }
+}
+
+/// Whether a node exists, and depends on choices that are summed out through these values.
+fn holds(graph: &Graph, given: &Given, n: NodeId, values: &[usize]) -> bool {
+    let same = |(x, value): &(u32, u32)| values.get(*x as usize) == Some(&(*value as usize));
+    given.iter().all(same) && graph.nodes[n as usize].state == State::Clean
+}
+
+/// Replaces an array, in its own memory if nothing else holds it.
+fn put(value: &mut Value, xs: &[f64]) {
+    if let Value::Array(old) = value
+        && let Some(old) = Arc::get_mut(old)
+        && old.len() == xs.len()
+    {
+        old.copy_from_slice(xs);
+        return;
+    }
+    *value = Value::Array(xs.into());
+}
+
+impl Trace {
+    /// Whether every node of a trace of the same history is the same to the last bit; else
+    /// says how one differs.
+    #[doc(hidden)]
+    pub fn same_nodes(&self, other: &Trace) -> Result<(), String> {
+        let (mine, theirs) = (&self.graph, &other.graph);
+        let all = |g: &Graph| (g.nodes.len(), g.prior.clone(), g.likelihood.clone());
+        if all(mine) != all(theirs) {
+            return Err(format!("sums {:?}, {:?}", all(mine), all(theirs)));
+        }
+        for (i, (a, b)) in mine.nodes.iter().zip(&theirs.nodes).enumerate() {
+            // Distributions and objects are the same only if they are one.
+            let same_value = match (a.value.downcast(), b.value.downcast()) {
+                (Some(CovarianceValue(a)), Some(CovarianceValue(b))) => a == b,
+                _ => a.value.same(&b.value) || format!("{:?}", a.value) == format!("{:?}", b.value),
+            };
+            let rest =
+                |n: &Node| (n.score.to_bits(), n.state, n.refs, n.flags, format!("{:?}", n.side));
+            if !same_value || rest(a) != rest(b) {
+                return Err(format!("node {i}: {a:?}, {b:?}"));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,411 @@
+//! Traces: one execution of a program as a dependency graph with dynamic structure.
+//!
+//! All access goes through one small interface: *propose* changes at addresses, get the
+//! weight of the incremental update, then *commit* or *roll back*. A choice that no
+//! observation depends on is not part of a trace; a [`query`](Trace::query) that needs it
+//! draws it from its prior given the rest.
+
+mod choices;
+mod eval;
+mod explain;
+mod gradient;
+mod graph;
+mod inspect;
+mod journal;
+mod limits;
+mod marginal;
+mod node;
+mod observed;
+mod operations;
+mod path;
+mod propose;
+mod query;
+mod save;
+mod select;
+mod shortcuts;
+mod surrogate;
+mod update;
+
+pub use crate::lang::address::{Address, AddressSegment, AddressTextError};
+pub use choices::{Selection, Target};
+#[doc(hidden)]
+pub use explain::{Dependent, Dependents, Effect, Term};
+pub use limits::{Limits, Stop};
+pub use observed::{Observation, Replicate};
+pub use operations::{Given, Update};
+pub use propose::{Change, Constraint, Draws, Weight};
+pub use save::{SaveError, SavedTrace};
+pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
+
+use crate::lang::code::Code;
+pub use crate::lang::error::RunError;
+use crate::lang::value::Value;
+#[doc(hidden)]
+pub use gradient::Recording;
+use graph::Graph;
+use journal::Before;
+pub use marginal::{Elimination, Explored, Marginal};
+use node::NONE;
+use std::sync::Arc;
+
+/// One execution of a program: the values of its choices and everything computed from
+/// them.
+#[derive(Debug)]
+pub struct Trace {
+    code: Arc<Code>,
+    graph: Graph,
+    update: Option<Before>,
+    /// Identifies the trace that selections belong to; a clone gets its own.
+    identity: Arc<()>,
+}
+
+impl Clone for Trace {
+    fn clone(&self) -> Self {
+        let (code, graph) = (Arc::clone(&self.code), self.graph.clone());
+        Trace { code, graph, update: self.update.clone(), identity: Arc::new(()) }
+    }
+}
+
+/// The result of an operation on a trace; if it fails, the trace is unchanged.
+pub type TraceResult<T> = Result<T, Box<RunError>>;
+
+impl Trace {
+    /// Returns a trace in which nothing has run: queries draw from the prior, and
+    /// observations are ignored.
+    pub fn prior(code: Arc<Code>, limits: Limits) -> Self {
+        let graph = Graph::new(&code, limits);
+        Trace { code, graph, update: None, identity: Arc::new(()) }
+    }
+
+    /// Runs a program and draws the choices that its observations depend on.
+    ///
+    /// # Errors
+    /// If the program fails, with the location of the fault.
+    pub fn simulate(code: Arc<Code>, draws: Draws, limits: Limits) -> TraceResult<Self> {
+        Trace::generate(code, std::iter::empty(), draws, limits).map(|(t, _)| t)
+    }
+
+    /// Runs a program with the values of some choices given. The weight is the log joint
+    /// minus the log density of the choices that were drawn: the importance weight of the
+    /// trace.
+    ///
+    /// # Errors
+    /// If the program fails, with the location of the fault.
+    pub fn generate(
+        code: Arc<Code>,
+        constraints: impl IntoIterator<Item = (u64, Constraint)>,
+        draws: Draws,
+        limits: Limits,
+    ) -> TraceResult<(Self, Weight)> {
+        let mut trace = Trace::prior(code, limits);
+        let g = &mut trace.graph;
+        g.constraints = constraints.into_iter().collect();
+        g.draws = draws;
+        let before = g.begin();
+        let effects = &trace.code.blocks[0].effects;
+        for s in effects {
+            g.nodes[*s as usize].refs = 1;
+        }
+        g.effects.extend(effects);
+        g.starting = true;
+        g.propagate(&trace.code)?;
+        g.starting = false;
+        let weight = g.weight(&before.prior, &before.likelihood);
+        g.commit(&trace.code);
+        g.constraints.clear();
+        g.revision = 0;
+        Ok((trace, weight))
+    }
+
+    /// Returns the program.
+    pub fn code(&self) -> &Arc<Code> {
+        &self.code
+    }
+
+    /// Proposes changes and updates everything that depends on them. The update is
+    /// pending until [`Trace::commit`] or [`Trace::rollback`]. A second proposal rolls
+    /// the first one back, so its targets must belong to the state before the first.
+    ///
+    /// # Errors
+    /// If the program fails under the proposed values; the trace is then unchanged.
+    pub fn propose(&mut self, changes: &[(Target, Change)], draws: Draws) -> TraceResult<Weight> {
+        self.propose_constrained(changes, &[], draws)
+    }
+
+    /// Does the same as [`Trace::propose`]; `constraints` are values that choices take if
+    /// they appear.
+    ///
+    /// # Errors
+    /// As [`Trace::propose`].
+    pub fn propose_constrained(
+        &mut self,
+        changes: &[(Target, Change)],
+        constraints: &[(u64, Constraint)],
+        draws: Draws,
+    ) -> TraceResult<Weight> {
+        self.propose_observed(changes, constraints, &[], draws)
+    }
+
+    /// Does the same as [`Trace::propose_constrained`], and replaces observed values,
+    /// given by the hashes of the observations' addresses.
+    fn propose_observed(
+        &mut self,
+        changes: &[(Target, Change)],
+        constraints: &[(u64, Constraint)],
+        observed: &[(u64, Value)],
+        draws: Draws,
+    ) -> TraceResult<Weight> {
+        self.rollback();
+        let before = self.graph.begin();
+        self.graph.draws = draws;
+        self.graph.constraints.extend(constraints.iter().cloned());
+        self.put_observed(observed);
+        let scaffold = match changes {
+            [(target, change)] if observed.is_empty() => {
+                self.graph.scaffold_of(&self.code, *target).map(|s| (*target, change, s))
+            }
+            _ => None,
+        };
+        let propagated = match scaffold {
+            Some((target, change, scaffold)) => {
+                self.graph.update_along_scaffold(&self.code, target, change, scaffold)
+            }
+            None => {
+                self.graph.queue(&self.code, changes);
+                self.graph.propagate(&self.code)
+            }
+        };
+        self.graph.constraints.clear();
+        self.pend(before, propagated)
+    }
+
+    /// Leaves a successful update pending, and undoes one that failed.
+    fn pend(&mut self, before: Before, propagated: TraceResult<()>) -> TraceResult<Weight> {
+        match propagated {
+            Ok(()) => {
+                let weight = self.graph.weight(&before.prior, &before.likelihood);
+                self.update = Some(before);
+                Ok(weight)
+            }
+            Err(e) => {
+                self.graph.rollback(&self.code, before);
+                Err(e)
+            }
+        }
+    }
+
+    /// Resamples the targets jointly from the prior.
+    ///
+    /// # Errors
+    /// As [`Trace::propose`].
+    pub fn regenerate(&mut self, targets: &[Target], draws: Draws) -> TraceResult<Weight> {
+        let changes: Vec<_> = targets.iter().map(|t| (*t, Change::Resample)).collect();
+        self.propose(&changes, draws)
+    }
+
+    /// Returns the choices that vanish in the pending proposal, with their previous
+    /// values.
+    pub fn removed(&self) -> Vec<(u64, Constraint)> {
+        self.graph.removed.iter().map(|(_, h, d)| (*h, Constraint::Stored(d.clone()))).collect()
+    }
+
+    /// Whether the pending proposal removes a choice. This includes a choice that is
+    /// resampled at the same address because its form changed; the value proposed for it
+    /// had no effect.
+    pub fn was_removed(&self, t: Target) -> bool {
+        self.graph.removed.iter().any(|(n, _, _)| *n == t.node)
+    }
+
+    /// Moves to a saved state (see [`Trace::constraints`]); selections stay valid.
+    ///
+    /// # Errors
+    /// As [`Trace::propose`].
+    pub fn restore(&mut self, saved: &[(u64, Constraint)], draws: Draws) -> TraceResult<()> {
+        self.rollback();
+        let values: rustc_hash::FxHashMap<u64, &Constraint> =
+            saved.iter().map(|(h, c)| (*h, c)).collect();
+        let here = self.all_targets();
+        let changes: Vec<_> = here
+            .iter()
+            .filter_map(|t| match values.get(&self.address_hash(*t)) {
+                Some(Constraint::Stored(d)) => Some((*t, Change::Set(d.clone()))),
+                _ => None,
+            })
+            .collect();
+        self.propose_constrained(&changes, saved, draws)?;
+        self.commit();
+        Ok(())
+    }
+
+    /// Commits the pending proposal, if there is one.
+    pub fn commit(&mut self) {
+        if self.update.take().is_some() {
+            self.graph.commit(&self.code);
+        }
+    }
+
+    /// Undoes the pending proposal, if there is one.
+    pub fn rollback(&mut self) {
+        if let Some(before) = self.update.take() {
+            self.graph.rollback(&self.code, before);
+        }
+    }
+
+    /// Returns the log joint density of choices, observations and factors.
+    pub fn log_joint(&self) -> f64 {
+        self.graph.log_joint()
+    }
+
+    /// Returns the prior part of the log joint: the choices.
+    pub fn log_prior(&self) -> f64 {
+        self.graph.prior.value()
+    }
+
+    /// Returns the likelihood part of the log joint: observations and factors.
+    pub fn log_likelihood(&self) -> f64 {
+        self.graph.likelihood.value()
+    }
+
+    /// Returns the sum of the log densities of the selected choices: their part of the
+    /// log prior.
+    pub fn score(&mut self, selector: &Selector) -> f64 {
+        let selection = self.select(selector);
+        let mut sum = pcadlang_numerics::num::ExactSum::default();
+        for t in self.targets(selection).to_vec() {
+            sum.add(self.score_of(t));
+        }
+        sum.value()
+    }
+
+    /// Returns the log density of a choice under its prior given the rest, in the current
+    /// state (including a pending proposal).
+    pub fn score_of(&self, t: Target) -> f64 {
+        let node = &self.graph.nodes[t.node as usize];
+        match node.side.as_deref() {
+            Some(node::Side::Choice(c)) if t.element != NONE => c.scores[t.element as usize],
+            _ => node.score,
+        }
+    }
+
+    /// Appends to `out` the gradient of the log prior plus `power` times the log
+    /// likelihood with respect to the unconstrained coordinates of these choices, one
+    /// choice after the other. It includes the log Jacobians of their transforms (see
+    /// [`Change::Free`]) and is taken in the current state (including a pending
+    /// proposal). Discrete choices have no coordinates.
+    ///
+    /// # Errors
+    /// If an operation between a choice and a score has no known derivative.
+    pub fn gradient(&self, targets: &[Target], power: f64, out: &mut Vec<f64>) -> TraceResult<()> {
+        self.weighted_gradient(targets, power, &|_| 1.0, out)
+    }
+
+    /// Does the same as [`Trace::gradient`], with the log density of each choice,
+    /// observation and factor multiplied by a weight; the log Jacobians are not weighted.
+    ///
+    /// # Errors
+    /// As [`Trace::gradient`].
+    pub fn weighted_gradient(
+        &self,
+        targets: &[Target],
+        power: f64,
+        weight: &dyn Fn(u32) -> f64,
+        out: &mut Vec<f64>,
+    ) -> TraceResult<()> {
+        let mut scored: Vec<u32> = self.all_targets().iter().map(|t| t.node).collect();
+        scored.dedup();
+        let mut observed: Vec<u32> = self.scored_nodes().collect();
+        self.graph.sort_by_place(&mut observed);
+        scored.extend(observed);
+        scored.retain(|n| weight(*n) != 0.0);
+        self.graph.gradient(&self.code, targets, &scored, (power, weight), out)
+    }
+
+    /// Whether nothing has been committed since the program was run.
+    pub fn is_new(&self) -> bool {
+        self.graph.revision == 0
+    }
+
+    /// Turns incremental updates off (every proposal then re-runs the whole program) or
+    /// on again; chains are the same either way.
+    pub fn set_incremental(&mut self, on: bool) {
+        self.graph.incremental = on;
+    }
+
+    /// Replaces the limits on what updates may build.
+    #[doc(hidden)]
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.graph.limits = limits;
+    }
+
+    /// Returns the limits on what updates may build.
+    pub fn limits(&self) -> &Limits {
+        &self.graph.limits
+    }
+
+    /// Returns the condition that interrupts updates, and searches that consist of many
+    /// updates.
+    pub fn stop(&self) -> &Stop {
+        &self.graph.limits.stop
+    }
+
+    /// Starts to record which operations are executed.
+    #[doc(hidden)]
+    pub fn record_execution(&mut self) {
+        self.graph.execution_log = Some(Vec::new());
+    }
+
+    /// Returns the source spans of the expressions that were executed since
+    /// [`Trace::record_execution`].
+    #[doc(hidden)]
+    pub fn executed(&mut self) -> Vec<pcadlang_syntax::span::Span> {
+        let log = self.graph.execution_log.take().unwrap_or_default();
+        log.into_iter().map(|(b, s)| self.code.blocks[b as usize].spans[s as usize]).collect()
+    }
+
+    /// Runs the program again from scratch with the same choices, to check the
+    /// incremental updates and the structure.
+    ///
+    /// # Errors
+    /// If the program fails.
+    pub fn rerun(&self) -> TraceResult<Trace> {
+        Trace::generate(
+            self.present_code(),
+            self.constraints(),
+            Draws::default(),
+            self.graph.limits.clone(),
+        )
+        .map(|(t, _)| t)
+    }
+
+    /// Generates another trace of the same program under the same observations, with the
+    /// values of some choices given.
+    ///
+    /// # Errors
+    /// If the program fails.
+    pub fn another(
+        &self,
+        constraints: impl IntoIterator<Item = (u64, Constraint)>,
+        draws: Draws,
+    ) -> TraceResult<Trace> {
+        let mut trace =
+            Trace::generate(self.present_code(), constraints, draws, self.graph.limits.clone())?.0;
+        trace.graph.incremental = self.graph.incremental;
+        Ok(trace)
+    }
+
+    /// The program, with the values that are currently observed.
+    fn present_code(&self) -> Arc<Code> {
+        match Arc::ptr_eq(&self.graph.observed, &self.code.observed) {
+            true => Arc::clone(&self.code),
+            false => Arc::new(self.code.with_observed(Arc::clone(&self.graph.observed))),
+        }
+    }
+
+    /// Returns the choices as constraints for [`Trace::generate`].
+    pub fn constraints(&self) -> Vec<(u64, Constraint)> {
+        let targets = self.all_targets();
+        let stored =
+            targets.iter().filter_map(|t| self.stored(*t).map(|d| (self.address_hash(*t), d)));
+        stored.map(|(h, d)| (h, Constraint::Stored(d))).collect()
+    }
+}

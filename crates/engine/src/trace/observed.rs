@@ -1,0 +1,447 @@
+//! Observed values as part of a trace: reading them, replacing them, and sampling them
+//! from their distributions given the choices. This is the basis of simulation-based
+//! calibration and posterior predictive checks.
+//!
+//! A value that replaces the program's is kept under the observation's address and scored
+//! from then on, also when the observation vanishes and reappears. Replacing it is a
+//! proposal like any other: pending until it is committed, undone by a roll-back. Scoring
+//! is in [`super::eval`].
+
+use super::graph::Graph;
+use super::journal::Entry;
+use super::node::*;
+use super::update::Failure;
+use super::{Address, Draws, Trace, TraceResult, Weight};
+use crate::lang::code::{Code, DistSpec, Observed, Op, Operand};
+use crate::lang::density::{is_repeated, pointwise};
+use crate::lang::error::Fault;
+use crate::lang::value::Value;
+use pcadlang_numerics::dist::{Datum, Dist, Support};
+use pcadlang_numerics::rng::Stream;
+use rustc_hash::FxHashMap;
+use std::sync::Arc;
+
+/// An observation of a trace.
+#[derive(Clone, Debug)]
+pub struct Observation {
+    /// Its address.
+    pub address: Address,
+    /// A hash of the address, stable between runs, by which [`Trace::set_observed`]
+    /// identifies it.
+    pub hash: u64,
+    /// The observed value.
+    pub value: Value,
+}
+
+/// New data for the observations of a trace, sampled given its choices.
+#[derive(Clone, Debug, Default)]
+pub struct Replicate {
+    /// The address hash and new value of each observation that can be sampled, by
+    /// address.
+    pub values: Vec<(u64, Value)>,
+    /// Those that cannot be sampled: factors, and observations under a likelihood without
+    /// a sampler. The address, and a description.
+    pub silent: Vec<(Address, String)>,
+}
+
+impl Trace {
+    /// Returns the observations with their values, by address; factors are not included.
+    pub fn observed(&self) -> Vec<Observation> {
+        let (g, code) = (&self.graph, &*self.code);
+        let one = |n: NodeId| {
+            let Op::Observe { value, site, .. } = g.op(code, n) else { return None };
+            let hash = g.site_hash(code, g.nodes[n as usize].frame, *site);
+            let value = g.observed_value(code, n, *value, &mut Deps::new()).clone();
+            Some(Observation { address: g.address(code, n), hash, value })
+        };
+        let mut all: Vec<_> = self.scored_nodes().filter_map(one).collect();
+        all.sort_by(|a, b| a.address.cmp(&b.address));
+        all
+    }
+
+    /// Samples every observation given the choices, in the shape of the observed value.
+    /// The trace is unchanged; [`Trace::set_observed`] takes the values.
+    ///
+    /// # Errors
+    /// If a likelihood fails while it samples.
+    pub fn replicate(&self, draws: Draws) -> TraceResult<Replicate> {
+        let (g, code) = (&self.graph, &*self.code);
+        let mut all = Vec::new();
+        let mut silent = Vec::new();
+        for n in self.scored_nodes() {
+            let address = g.address(code, n);
+            let Op::Observe { site, .. } = g.op(code, n) else {
+                silent.push((address, "a factor".to_owned()));
+                continue;
+            };
+            let hash = g.site_hash(code, g.nodes[n as usize].frame, *site);
+            match g.draw_observed(code, n, &mut draws.stream(hash))? {
+                Ok(value) => all.push((address, hash, value)),
+                Err(what) => silent.push((address, what)),
+            }
+        }
+        all.sort_by(|a, b| a.0.cmp(&b.0));
+        silent.sort();
+        Ok(Replicate {
+            values: all.into_iter().map(|(_, hash, value)| (hash, value)).collect(),
+            silent,
+        })
+    }
+
+    /// Proposes replacements of observed values, given by the hashes of the observations'
+    /// addresses. The update is pending until [`Trace::commit`] or [`Trace::rollback`]. A
+    /// value for an observation that does not exist yet is kept until it does.
+    ///
+    /// # Errors
+    /// If a value cannot be scored; the trace is then unchanged.
+    pub fn set_observed(&mut self, values: &[(u64, Value)]) -> TraceResult<Weight> {
+        self.propose_observed(&[], &[], values, Draws::default())
+    }
+
+    /// Returns the log density of each observed value: for each observation, the hash of
+    /// its address and the log densities of its elements (a single one if it has no
+    /// elements). Sorted by hash, so that the same observations come in the same order.
+    /// `None` if there are more than `most` values.
+    ///
+    /// ```
+    /// let model = pcadlang::Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = [1, 2] as y; observe poisson(3) = 2 as k;")?;
+    /// let trace = model.simulate(1, 0)?;
+    /// let all = trace.pointwise(100).unwrap_or_default();
+    /// let sum: f64 = all.iter().flat_map(|(_, scores)| scores).sum();
+    /// assert!((sum - trace.log_likelihood()).abs() < 1e-12);
+    /// let mut points = trace.points(100);
+    /// points.sort_by(|a, b| a.0.cmp(&b.0));
+    /// assert_eq!(points, [("k".to_owned(), 2.0), ("y[0]".to_owned(), 1.0), ("y[1]".to_owned(), 2.0)]);
+    /// assert!(trace.pointwise(2).is_none());
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
+    pub fn pointwise(&self, most: usize) -> Option<Vec<(u64, Vec<f64>)>> {
+        let (g, code) = (&self.graph, &*self.code);
+        let (mut all, mut count) = (Vec::new(), 0);
+        for n in self.scored_nodes() {
+            let Op::Observe { dist: spec, value, site, .. } = g.op(code, n) else { continue };
+            let (mut deps, frame) = (Deps::new(), g.nodes[n as usize].frame);
+            let observed = g.observed_value(code, n, *value, &mut deps);
+            let likelihood = matches!(spec, DistSpec::Value(o) if !matches!(g.value(code, frame, *o), Value::Dist(_)));
+            let scores = match likelihood {
+                true => vec![self.score_at(n)],
+                false => match g.make_dist(code, n, frame, spec, &mut deps) {
+                    Ok(dist) => pointwise(&dist, observed),
+                    Err(_) => vec![f64::NAN],
+                },
+            };
+            count += scores.len();
+            if count > most {
+                return None;
+            }
+            all.push((g.site_hash(code, frame, *site), scores));
+        }
+        all.sort_by_key(|(hash, _)| *hash);
+        Some(all)
+    }
+
+    /// Returns the observed values in the order of [`Trace::pointwise`]: the name (the
+    /// observation's address and the index of the element) and the value as a number, or
+    /// NaN if it is not a number.
+    pub fn points(&self, most: usize) -> Vec<(String, f64)> {
+        let Some(scores) = self.pointwise(most) else { return Vec::new() };
+        let mut observed: FxHashMap<u64, Observation> =
+            self.observed().into_iter().map(|o| (o.hash, o)).collect();
+        let mut all = Vec::new();
+        for (hash, scores) in scores {
+            let Some(o) = observed.remove(&hash) else { continue };
+            let name = o.address.to_string();
+            let name = name.trim_start_matches('@');
+            let number = |v: Value| match v {
+                Value::Num(x) => x,
+                Value::Bool(b) => f64::from(u8::from(b)),
+                _ => f64::NAN,
+            };
+            match (o.value.len(), scores.len()) {
+                (Some(n), count) if n == count => all.extend((0..n).map(|i| {
+                    (format!("{name}[{i}]"), o.value.element(i).map_or(f64::NAN, number))
+                })),
+                (_, count) => {
+                    all.extend((0..count).map(|_| (name.to_owned(), number(o.value.clone()))))
+                }
+            }
+        }
+        all
+    }
+
+    /// Returns the observations by the hashes of their addresses.
+    pub(super) fn observation_nodes(&self) -> FxHashMap<u64, NodeId> {
+        let (g, code) = (&self.graph, &*self.code);
+        let hashed = |n: NodeId| match g.op(code, n) {
+            Op::Observe { site, .. } => {
+                Some((g.site_hash(code, g.nodes[n as usize].frame, *site), n))
+            }
+            _ => None,
+        };
+        self.scored_nodes().filter_map(hashed).collect()
+    }
+
+    /// Replaces observed values, within an update.
+    pub(super) fn put_observed(&mut self, values: &[(u64, Value)]) {
+        if values.is_empty() {
+            return;
+        }
+        let nodes = self.observation_nodes();
+        for (hash, value) in values {
+            self.graph.put_observed(*hash, value.clone());
+            if let Some(n) = nodes.get(hash) {
+                self.graph.save(*n);
+                self.graph.nodes[*n as usize].flags |= TARGET;
+                self.graph.invalidate_target(&self.code, *n);
+            }
+        }
+    }
+
+    /// Returns the values that replace the program's observed values. The allocation
+    /// changes whenever they do, so that holders can detect a change by pointer.
+    pub fn replacements(&self) -> &Arc<Observed> {
+        &self.graph.observed
+    }
+
+    /// Observes the same values as another trace of the same program.
+    ///
+    /// # Errors
+    /// As [`Trace::set_observed`].
+    pub fn observe_as(&mut self, other: &Trace) -> TraceResult<()> {
+        if Arc::ptr_eq(&self.graph.observed, &other.graph.observed) {
+            return Ok(());
+        }
+        let mut values: Vec<_> =
+            other.graph.observed.iter().map(|(hash, v)| (*hash, v.clone())).collect();
+        values.sort_by_key(|(hash, _)| *hash);
+        self.set_observed(&values)?;
+        self.commit();
+        self.graph.observed = Arc::clone(&other.graph.observed);
+        Ok(())
+    }
+}
+
+impl Graph {
+    fn put_observed(&mut self, hash: u64, value: Value) {
+        let old = Arc::make_mut(&mut self.observed).insert(hash, value);
+        self.note(Entry::Observed(hash, old));
+    }
+
+    /// Undoes [`Graph::put_observed`].
+    pub(super) fn undo_observed(&mut self, hash: u64, old: Option<Value>) {
+        let all = Arc::make_mut(&mut self.observed);
+        match old {
+            Some(v) => all.insert(hash, v),
+            None => all.remove(&hash),
+        };
+    }
+
+    /// Returns the value that replaces an observation's value in the program, if any.
+    pub(crate) fn replaced(&self, code: &Code, n: NodeId) -> Option<&Value> {
+        if self.observed.is_empty() {
+            return None;
+        }
+        let Op::Observe { site, .. } = self.op(code, n) else { return None };
+        self.observed.get(&self.site_hash(code, self.nodes[n as usize].frame, *site))
+    }
+
+    /// Returns the value of an observation; nodes read for it are added to `deps`.
+    pub(crate) fn observed_value<'a>(
+        &'a self,
+        code: &'a Code,
+        n: NodeId,
+        value: Operand,
+        deps: &mut Deps,
+    ) -> &'a Value {
+        match self.replaced(code, n) {
+            Some(v) => v,
+            None => self.plain(code, self.nodes[n as usize].frame, value, deps),
+        }
+    }
+
+    /// Returns a message if the observed value is outside the support of its distribution
+    /// under the current parameters, so that its probability is zero.
+    pub(super) fn outside_support(&self, code: &Code, n: NodeId) -> Option<String> {
+        let Op::Observe { dist: spec, value, .. } = self.op(code, n) else { return None };
+        let (mut deps, frame) = (Deps::new(), self.nodes[n as usize].frame);
+        let observed = self.observed_value(code, n, *value, &mut deps);
+        if let DistSpec::Value(o) = spec
+            && !matches!(self.value(code, frame, *o), Value::Dist(_))
+        {
+            return None;
+        }
+        let dist = self.make_dist(code, n, frame, spec, &mut deps).ok()?;
+        let count =
+            dist.elements().or_else(|| observed.len().filter(|_| is_repeated(&dist, observed)));
+        let Some(count) = count else { return outside(&dist, observed) };
+        (0..count).find_map(|i| outside(&dist.element(i), &observed.element(i)?))
+    }
+
+    /// Samples an observation, or describes why it cannot be sampled.
+    fn draw_observed(
+        &self,
+        code: &Code,
+        n: NodeId,
+        rng: &mut Stream,
+    ) -> Result<Result<Value, String>, Failure> {
+        let frame = self.nodes[n as usize].frame;
+        let Op::Observe { dist: spec, value, .. } = self.op(code, n) else {
+            return Ok(Err("a factor".into()));
+        };
+        let mut deps = Deps::new();
+        let observed = self.observed_value(code, n, *value, &mut deps);
+        if let DistSpec::Value(o) = spec
+            && let Value::Likelihood(l) = self.value(code, frame, *o)
+        {
+            return match l.sample(observed, rng) {
+                Some(drawn) => drawn.map(Ok).map_err(|e| self.fault(code, n, Fault::type_error(e))),
+                None => Ok(Err(format!("the likelihood `{}`", l.name()))),
+            };
+        }
+        let dist = self.make_dist(code, n, frame, spec, &mut deps)?;
+        if dist.is_improper() {
+            return Ok(Err(format!("the improper distribution `{}`", dist.name())));
+        }
+        Ok(Ok(sample_like(&dist, observed, rng)))
+    }
+}
+
+/// Returns a message if a value is outside the support of a distribution.
+fn outside(dist: &Dist, observed: &Value) -> Option<String> {
+    let x = observed.to_datum()?;
+    let support = dist.support();
+    let is_truth = support == Support::Boolean && matches!(x, Datum::Num(0.0 | 1.0));
+    let apart = || {
+        format!(
+            "the observed value {observed} is outside the support of `{}` ({support})",
+            dist.name()
+        )
+    };
+    (!is_truth && !support.contains(&x)).then(apart)
+}
+
+/// Samples in the form in which a value is scored: element by element if the distribution
+/// is over less than the whole value.
+fn sample_like(dist: &Dist, observed: &Value, rng: &mut Stream) -> Value {
+    let mut one = |d: &Dist| Value::from_datum(&d.sample(rng));
+    if let Some(count) = dist.elements() {
+        return Value::from_elements((0..count).map(|i| one(&dist.element(i))).collect());
+    }
+    match observed {
+        Value::Array(xs) if is_repeated(dist, observed) => {
+            Value::from_elements(xs.iter().map(|_| one(dist)).collect())
+        }
+        Value::List(_) if observed.to_datum().is_some_and(|x| dist.support().fits(&x)) => one(dist),
+        Value::List(xs) => Value::from_elements(xs.iter().map(|_| one(dist)).collect()),
+        _ => one(dist),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trace::Change;
+    use pcadlang_library::model::Model;
+    use pcadlang_numerics::rng::{Purpose, StreamKey};
+
+    fn draws(step: u64) -> Draws {
+        Draws { key: StreamKey::new(3, 0, Purpose::REPLICATE), step, substream: 0 }
+    }
+
+    fn trace(text: &str) -> Trace {
+        Model::from_text(text)
+            .unwrap_or_else(|e| panic!("{e}"))
+            .simulate(1, 0)
+            .unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    const TEXT: &str = "assume x ~ normal(0, 1); assume c ~ flip(0.5);
+         observe normal(x, 0.5) = 2 as a;
+         observe normal(x, 1) = [1, 2, 3] as b;
+         for i in 0 .. 3 { observe poisson(1 + x * x) = i as n; }
+         if c { observe flip(0.3) = true as f; }";
+
+    #[test]
+    fn what_is_put_in_place_is_scored_read_back_and_undone() {
+        let mut t = trace(TEXT);
+        let before = (t.log_joint(), t.observed());
+        assert!(before.1.len() >= 5);
+        let new = t.replicate(draws(0)).unwrap();
+        assert!(new.silent.is_empty());
+        let w = t.set_observed(&new.values).unwrap();
+        assert!(
+            (t.log_joint() - before.0 - w.log_joint).abs() < 1e-12
+                && w.log_joint == w.log_likelihood
+        );
+        t.rollback();
+        assert_eq!(t.log_joint().to_bits(), before.0.to_bits());
+        assert!(t.observed().iter().zip(&before.1).all(|(a, b)| a.value.same(&b.value)));
+        t.set_observed(&new.values).unwrap();
+        t.commit();
+        let (score, read) = (t.log_joint(), t.observed());
+        for o in &read {
+            let v = new.values.iter().find(|(h, _)| *h == o.hash).unwrap();
+            assert!(o.value.same(&v.1), "{}", o.address);
+        }
+        assert_eq!(score.to_bits(), t.rerun().unwrap().log_joint().to_bits());
+        assert!(matches!(&read[0].value, Value::Num(_)) && read[1].value.len() == Some(3));
+    }
+
+    #[test]
+    fn updates_go_on_with_what_was_put_in_place() {
+        let mut t = trace(TEXT);
+        let new = t.replicate(draws(1)).unwrap();
+        t.set_observed(&new.values).unwrap();
+        t.commit();
+        for step in 0..50 {
+            let all = t.select(&crate::trace::Selector::All);
+            let targets = t.targets(all).to_vec();
+            let target = targets[step as usize % targets.len()];
+            t.propose(&[(target, Change::Resample)], draws(2 + step)).unwrap();
+            if step % 3 == 0 {
+                t.rollback()
+            } else {
+                t.commit()
+            }
+            assert_eq!(t.log_joint().to_bits(), t.rerun().unwrap().log_joint().to_bits());
+        }
+        let mut whole = t.clone();
+        whole.set_incremental(false);
+        let other = t.replicate(draws(99)).unwrap().values;
+        assert_eq!(t.set_observed(&other).unwrap(), whole.set_observed(&other).unwrap());
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_is_named() {
+        let t = trace(
+            "assume x ~ normal(0, 1); factor(-x * x); observe flat() = x; observe normal(x, 1) = 0;",
+        );
+        let r = t.replicate(draws(0)).unwrap();
+        let named: Vec<String> = r.silent.iter().map(|(a, w)| format!("{a}: {w}")).collect();
+        assert_eq!(r.values.len(), 1);
+        assert!(named.contains(&"@factor#1: a factor".to_owned()), "{named:?}");
+        assert!(named.iter().any(|n| n.contains("improper distribution `flat`")), "{named:?}");
+    }
+
+    #[test]
+    fn draws_have_the_moments_of_the_distribution() {
+        let t = trace(
+            "assume x ~ normal(0, 1); observe normal(x, 2) = [0, 0]; observe mv_normal([x, 0], [[1, 0.5], [0.5, 2]]) = [0, 0];",
+        );
+        let Some(Value::Num(x)) = t.choices().first().map(|(_, v, _)| v.clone()) else {
+            panic!("no choice")
+        };
+        let (mut sum, mut cross, n) = (0.0, 0.0, 20_000);
+        for step in 0..n {
+            let r = t.replicate(draws(step)).unwrap().values;
+            let number = |k: usize, i: usize| match r[k].1.element(i) {
+                Some(Value::Num(v)) => v,
+                v => panic!("{v:?}"),
+            };
+            sum += number(0, 1);
+            cross += (number(1, 0) - x) * number(1, 1);
+        }
+        // The standard errors are 0.014 and 0.011.
+        assert!((sum / n as f64 - x).abs() < 0.07 && (cross / n as f64 - 0.5).abs() < 0.06);
+    }
+}

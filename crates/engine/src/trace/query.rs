@@ -1,0 +1,142 @@
+//! Queries: values of expressions and names that no observation depends on, and
+//! surrogates of observations. Choices drawn for a query are discarded afterwards.
+
+use super::graph::Graph;
+use super::node::{Arguments, Deps, Frame, FrameId, State};
+use super::{Address, Draws, Trace, TraceResult};
+use crate::lang::code::{BlockId, Code, Operand};
+use crate::lang::value::Value;
+use std::sync::Arc;
+
+impl Trace {
+    /// Returns the values of top-level expressions. Choices that they need and no
+    /// observation depends on are drawn from their prior given the rest, and discarded
+    /// afterwards.
+    ///
+    /// # Errors
+    /// If their evaluation fails.
+    #[doc(hidden)]
+    pub fn query(&mut self, operands: &[Operand], draws: Draws) -> TraceResult<Vec<Value>> {
+        self.asked(|graph, code| graph.query(code, 0, operands), draws, |_, values| Ok(values))
+    }
+
+    /// Returns the value of a top-level expression, if the state has it.
+    #[doc(hidden)]
+    pub fn evaluated(&self, operand: Operand) -> Option<&Value> {
+        let node = &self.graph.nodes[self.graph.resolve(0, operand)? as usize];
+        (node.state == State::Clean).then_some(&node.value)
+    }
+
+    /// Evaluates a function of the program, which sees the present state, with these
+    /// arguments. One that is missing is an error only if the function reads it. Choices
+    /// that the state lacks are drawn as by [`Trace::query`].
+    pub fn call(
+        &mut self,
+        function: BlockId,
+        args: Arc<[TraceResult<Value>]>,
+        draws: Draws,
+    ) -> TraceResult<Value> {
+        let args = Arguments::Supplied(args);
+        let root = self.graph.frames[0].clone();
+        let frame = Frame { block: function, parent: 0, depth: 1, args, ..root };
+        let evaluate = |graph: &mut Graph, code: &Code| {
+            let frame = graph.make_frame(code, frame)?;
+            graph.query(code, frame, code.blocks[function as usize].result.as_slice())
+        };
+        self.asked(evaluate, draws, |_, mut values| Ok(values.pop().unwrap_or_default()))
+    }
+
+    /// Like [`Trace::query`], and passes to `look` the trace with the choices that were
+    /// drawn for it, before they are discarded.
+    ///
+    /// # Errors
+    /// As [`Trace::query`].
+    #[doc(hidden)]
+    pub fn imagine<T>(
+        &mut self,
+        operands: &[Operand],
+        draws: Draws,
+        look: impl FnOnce(&Trace, Vec<Value>) -> T,
+    ) -> TraceResult<T> {
+        self.asked(
+            |graph, code| graph.query(code, 0, operands),
+            draws,
+            |trace, values| {
+                trace.graph.update_selections(&trace.code)?;
+                Ok(look(trace, values))
+            },
+        )
+    }
+
+    /// Evaluates expressions, passes them to `used`, and undoes the evaluation.
+    fn asked<T>(
+        &mut self,
+        evaluate: impl FnOnce(&mut Graph, &Code) -> TraceResult<Vec<Value>>,
+        draws: Draws,
+        used: impl FnOnce(&mut Trace, Vec<Value>) -> TraceResult<T>,
+    ) -> TraceResult<T> {
+        self.rollback();
+        let before = self.graph.begin();
+        self.graph.draws = draws;
+        self.graph.before = Some(before.clone());
+        let result = evaluate(&mut self.graph, &self.code);
+        self.graph.before = None;
+        let result = result.and_then(|values| used(self, values));
+        self.graph.rollback(&self.code, before);
+        result
+    }
+
+    /// Returns the value of a top-level name.
+    ///
+    /// # Errors
+    /// As [`Trace::query`]; `None` if the name does not exist.
+    pub fn global(&mut self, name: &str, draws: Draws) -> Option<TraceResult<Value>> {
+        let operand = *self.code.globals.get(name)?;
+        Some(self.query(&[operand], draws).map(|mut v| v.swap_remove(0)))
+    }
+
+    /// Returns the log density of the coarse surrogate of an observation
+    /// (`with coarse = …`), given the observation's address. It is never part of the
+    /// joint.
+    ///
+    /// # Errors
+    /// If its evaluation fails; `None` if the observation does not exist or has no
+    /// surrogate.
+    #[doc(hidden)]
+    pub fn surrogate(&mut self, address: &Address, draws: Draws) -> TraceResult<Option<f64>> {
+        let Some((n, _)) =
+            self.scored().into_iter().find(|(n, _)| self.graph.address(&self.code, *n) == *address)
+        else {
+            return Ok(None);
+        };
+        self.rollback();
+        let before = self.graph.begin();
+        self.graph.draws = draws;
+        let result = self.graph.surrogate_score(&self.code, n);
+        self.graph.rollback(&self.code, before);
+        result
+    }
+}
+
+impl Graph {
+    pub(super) fn query(
+        &mut self,
+        code: &Code,
+        frame: FrameId,
+        operands: &[Operand],
+    ) -> TraceResult<Vec<Value>> {
+        let mut values = Vec::with_capacity(operands.len());
+        for o in operands {
+            if let Some(n) = self.resolve(frame, *o) {
+                self.evaluate(code, n)?;
+            }
+            if let Value::Container(r) = self.value(code, frame, *o) {
+                let gather = r.node + 1;
+                self.evaluate(code, gather)?;
+            }
+            let mut deps = Deps::new();
+            values.push(self.plain(code, frame, *o, &mut deps).clone());
+        }
+        Ok(values)
+    }
+}

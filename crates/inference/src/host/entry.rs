@@ -1,0 +1,407 @@
+//! One item that a host registers.
+
+use super::Previous;
+use super::checked::Checked;
+use crate::{Kernel, KernelCall, KernelMaker};
+use pcadlang_engine::lang::adjoint::Adjoint;
+use pcadlang_engine::lang::builtins::data::{self, DataFormat};
+use pcadlang_engine::lang::builtins::{
+    Args, Argument, Builtin, Derivative, HostItem, Kind, PreviousEvaluation, Row, State, Type,
+};
+use pcadlang_engine::lang::error::Fault;
+use pcadlang_engine::lang::value::{Likelihood, Value};
+use pcadlang_numerics::dist::{Dist, Distribution};
+use pcadlang_syntax::{is_keyword, is_name};
+use std::borrow::Cow;
+use std::sync::Arc;
+
+/// One item that a host registers: a function, a family of distributions or likelihoods,
+/// or a kernel. Arguments are declared in order.
+///
+/// Closures are called from several threads at once, and must return bit-identical
+/// results for the same arguments.
+#[derive(Clone)]
+pub struct Entry {
+    pub(super) builtin: Builtin,
+    pub(super) replaces: bool,
+    /// A mistake in its declaration, reported by `Host::table`.
+    pub(super) wrong: Option<String>,
+}
+
+impl Entry {
+    fn new(
+        name: impl Into<Cow<'static, str>>,
+        section: &'static str,
+        returns: Type,
+        host: HostItem,
+    ) -> Entry {
+        let (kind, derivative) = host.entry();
+        let mut entry = Entry::bare(name, section, returns, kind);
+        (entry.builtin.derivative, entry.builtin.host) = (derivative, Some(host));
+        entry
+    }
+
+    /// An entry without arguments, with nothing of the host's behind it yet.
+    fn bare(
+        name: impl Into<Cow<'static, str>>,
+        section: &'static str,
+        returns: Type,
+        kind: Kind,
+    ) -> Entry {
+        let builtin = Builtin {
+            name: name.into(),
+            module: "".into(),
+            section: section.into(),
+            args: [].into(),
+            variadic: false,
+            returns,
+            doc: "Of the host.".into(),
+            kind,
+            scalar: None,
+            derivative: Derivative::Unknown,
+            host: None,
+            format: None,
+            example: None,
+        };
+        Entry { builtin, replaces: false, wrong: None }
+    }
+
+    /// Creates a function.
+    ///
+    /// ```
+    /// use pcadlang::host::{Entry, Fault, Host, Type};
+    /// use pcadlang::{Program, Value};
+    /// let table = vec![3.0, 1.0, 2.0];
+    /// let look_up = Entry::function("look_up", move |a| {
+    ///     let i = a.int_in(0, 0, 2)?;
+    ///     Ok(Value::Num(table[i as usize]))
+    /// })
+    /// .argument("i", Type::Int, "Which one.")
+    /// .section("The host's tables")
+    /// .returns(Type::Num)
+    /// .flat();
+    /// let model = Program::parse("let x = look_up(0); predict y ~ normal(x, 1);")?.host(&Host::new().with(look_up))?;
+    /// assert!(model.compile().is_ok());
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
+    pub fn function(
+        name: impl Into<Cow<'static, str>>,
+        call: impl Fn(&Args) -> Result<Value, Fault> + Send + Sync + 'static,
+    ) -> Entry {
+        Entry::new(name, HOST, Type::Any, HostItem::Function { call: Arc::new(call), vjp: None })
+    }
+
+    /// Creates a function that can resume from an earlier evaluation, and that returns
+    /// the state to resume from next time.
+    ///
+    /// The result must equal that from scratch (`None`), bit for bit: an earlier
+    /// evaluation only saves work. The state belongs to a call site in the program and to
+    /// a state of the trace: a rejected proposal restores the previous one, and forks of
+    /// a trace share it. It is never modified in place, so a large state should share its
+    /// unchanged parts.
+    ///
+    /// ```
+    /// use pcadlang::host::{Entry, Fault, Host, Previous, Type};
+    /// use pcadlang::trace::{Draws, Trace};
+    /// use pcadlang::{Program, Value};
+    /// use std::sync::Arc;
+    /// use std::sync::atomic::{AtomicUsize, Ordering};
+    /// // The sum of the squares of whole numbers, which is exact in any order.
+    /// let squared = Arc::new(AtomicUsize::new(0));
+    /// let count = Arc::clone(&squared);
+    /// let squares = Entry::incremental("squares", move |a, previous: Option<Previous<Vec<f64>>>| {
+    ///     let xs = a.array(0)?;
+    ///     let mut each = match &previous {
+    ///         Some(p) if p.state().len() == xs.len() => p.state().clone(),
+    ///         _ => vec![0.0; xs.len()],
+    ///     };
+    ///     let changed = previous.and_then(|p| p.changed_elements(a, 0)).unwrap_or((0..xs.len()).collect());
+    ///     for i in changed {
+    ///         count.fetch_add(1, Ordering::Relaxed);
+    ///         each[i] = xs[i] * xs[i];
+    ///     }
+    ///     Ok((Value::Num(each.iter().sum()), each))
+    /// })
+    /// .argument("xs", Type::Array, "Numbers.");
+    /// let text = "assume a ~ poisson(4); assume b ~ poisson(4); observe normal(squares([a, b]), 1) = 25;";
+    /// let model = Program::parse(text)?.host(&Host::new().with(squares))?.compile()?;
+    /// let mut trace = model.simulate(1, 0)?;
+    /// for (address, value) in [("@a", 3.0), ("@b", 4.0), ("@a", 5.0)] {
+    ///     squared.store(0, Ordering::Relaxed);
+    ///     trace.set(address, value, Draws::default()).unwrap();
+    ///     assert!(squared.load(Ordering::Relaxed) <= 1);
+    /// }
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
+    pub fn incremental<S: Send + Sync + 'static>(
+        name: impl Into<Cow<'static, str>>,
+        call: impl Fn(&Args, Option<Previous<'_, S>>) -> Result<(Value, S), Fault>
+        + Send
+        + Sync
+        + 'static,
+    ) -> Entry {
+        let call = move |a: &Args, before: Option<&PreviousEvaluation>| {
+            let previous = before.and_then(Previous::new);
+            call(a, previous).map(|(value, state)| (value, Arc::new(state) as State))
+        };
+        Entry::new(name, HOST, Type::Any, HostItem::Incremental { call: Arc::new(call), vjp: None })
+    }
+
+    /// Creates a family of distributions; `make` maps the parameters to a distribution. A
+    /// parameter outside its domain is a [`Fault::domain`].
+    ///
+    /// A value whose log density is NaN counts as impossible.
+    /// [`Gradient::params`](crate::host::Gradient) has one derivative for each number in
+    /// the arguments, in order.
+    pub fn distribution<D: Distribution + 'static>(
+        name: impl Into<Cow<'static, str>>,
+        make: impl Fn(&Args) -> Result<D, Fault> + Send + Sync + 'static,
+    ) -> Entry {
+        let make = move |a: &Args| make(a).map(|d| Dist::Custom(Arc::new(Checked(d))));
+        Entry::new(name, "Distributions", Type::Dist, HostItem::Family(Arc::new(make)))
+    }
+
+    /// Creates a family of likelihoods; `make` maps the arguments to a likelihood, which
+    /// scores the observed value. A comparator is a likelihood with a view as an argument
+    /// (see `SceneView` of the module `scene`).
+    ///
+    /// [`Likelihood::gradient`] is a list: the adjoint of each argument in turn.
+    pub fn likelihood<L: Likelihood + 'static>(
+        name: impl Into<Cow<'static, str>>,
+        make: impl Fn(&Args) -> Result<L, Fault> + Send + Sync + 'static,
+    ) -> Entry {
+        let make = move |a: &Args| make(a).map(|l| Value::Likelihood(Arc::new(l)));
+        Entry::new(name, "Comparing", Type::Likelihood, HostItem::Likelihood(Arc::new(make)))
+    }
+
+    /// A kind of data files: what may stand after the colon of `data d: kind;`. Its first
+    /// argument is the file; further ones are options of the format.
+    ///
+    /// ```
+    /// use pcadlang::host::{Beside, DataFormat, DataOptions, Entry, Fault, FaultKind, Host, Type};
+    /// use pcadlang::{Program, Value};
+    /// use std::sync::Arc;
+    /// /// One number a line.
+    /// #[derive(Debug)]
+    /// struct Numbers;
+    /// impl DataFormat for Numbers {
+    ///     fn load(
+    ///         &self,
+    ///         file: &str,
+    ///         bytes: &[u8],
+    ///         _: &DataOptions,
+    ///         _: &Beside,
+    ///     ) -> Result<Value, Fault> {
+    ///         let numbers: Result<Vec<f64>, _> =
+    ///             String::from_utf8_lossy(bytes).lines().map(str::parse).collect();
+    ///         numbers
+    ///             .map(Value::array)
+    ///             .map_err(|e| Fault::new(FaultKind::Other, format!("{file}: {e}")))
+    ///     }
+    /// }
+    /// let host = Host::new().with(
+    ///     Entry::data("numbers", Type::Array, Arc::new(Numbers)).about("Numbers, one a line."),
+    /// );
+    /// let file = std::env::temp_dir().join(format!("numbers-{}.txt", std::process::id()));
+    /// std::fs::write(&file, "1\n2.5\n").unwrap();
+    /// let text = "data d: numbers; predict x ~ normal(sum(d), 1);";
+    /// let program = Program::parse(text)?.host(&host)?;
+    /// assert!(program.clone().observe_file("d", &file.to_string_lossy())?.compile().is_ok());
+    /// std::fs::write(&file, "1\ntwo\n").unwrap();
+    /// let wrong = program.observe_file("d", &file.to_string_lossy()).err().unwrap();
+    /// assert!(wrong.to_string().contains("invalid float literal"));
+    /// std::fs::remove_file(&file).unwrap();
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
+    pub fn data(
+        name: impl Into<Cow<'static, str>>,
+        returns: Type,
+        format: Arc<dyn DataFormat>,
+    ) -> Entry {
+        let kind = Kind::Function(data::not_an_expression);
+        let mut entry = Entry::bare(name, data::SECTION, returns, kind);
+        entry.builtin.format = Some(format);
+        entry.argument("file", Type::Str, "The path, relative to the program's folder.")
+    }
+
+    /// Creates a kernel for `infer` blocks; `make` maps the call as written to a kernel.
+    /// Each chain makes its own.
+    pub fn kernel<K: Kernel + 'static>(
+        name: impl Into<Cow<'static, str>>,
+        make: impl Fn(&mut KernelCall) -> Result<K, Fault> + Send + Sync + 'static,
+    ) -> Entry {
+        let maker = KernelMaker::new(move |call| Ok(Box::new(make(call)?)));
+        Entry::new(name, "Kernels", Type::Kernel, HostItem::Kernel(Arc::new(maker)))
+    }
+
+    /// Appends a required argument.
+    #[must_use]
+    pub fn argument(
+        self,
+        name: impl Into<Cow<'static, str>>,
+        ty: Type,
+        about: impl Into<Cow<'static, str>>,
+    ) -> Entry {
+        let (name, doc) = (name.into(), about.into());
+        self.push(Argument { name, ty, unit: "".into(), default: None, value: Value::Unit, doc })
+    }
+
+    /// Appends an optional argument with its default.
+    #[must_use]
+    pub fn optional(
+        self,
+        name: impl Into<Cow<'static, str>>,
+        ty: Type,
+        default: impl Into<Value>,
+        about: impl Into<Cow<'static, str>>,
+    ) -> Entry {
+        let (name, doc, value) = (name.into(), about.into(), default.into());
+        self.push(Argument {
+            name,
+            ty,
+            unit: "".into(),
+            default: Some(value.to_string().into()),
+            value,
+            doc,
+        })
+    }
+
+    /// Sets the unit of the argument declared last.
+    #[must_use]
+    pub fn unit(mut self, unit: impl Into<Cow<'static, str>>) -> Entry {
+        let mut args = self.builtin.args.to_vec();
+        match args.last_mut() {
+            Some(a) => a.unit = unit.into(),
+            None => self.wrong = Some("a unit must belong to an argument".into()),
+        }
+        self.builtin.args = args.into();
+        self
+    }
+
+    /// Sets the type of the result, for static checks and `doc`.
+    #[must_use]
+    pub fn returns(mut self, ty: Type) -> Entry {
+        self.builtin.returns = ty;
+        self
+    }
+
+    /// Sets the one-line description.
+    #[must_use]
+    pub fn about(mut self, line: impl Into<Cow<'static, str>>) -> Entry {
+        self.builtin.doc = line.into();
+        self
+    }
+
+    /// Sets the heading of its section in the reference.
+    #[must_use]
+    pub fn section(mut self, heading: impl Into<Cow<'static, str>>) -> Entry {
+        self.builtin.section = heading.into();
+        self
+    }
+
+    /// Sets the vector-Jacobian product of a function: it maps the arguments, the result
+    /// and the adjoint of the result to the adjoints of the arguments, in order; `None`
+    /// where they are unknown. Omitted trailing adjoints are zero.
+    #[must_use]
+    pub fn gradient(
+        mut self,
+        product: impl Fn(&Args, &Value, &Adjoint) -> Option<Vec<Adjoint>> + Send + Sync + 'static,
+    ) -> Entry {
+        match &mut self.builtin.host {
+            Some(HostItem::Function { vjp, .. } | HostItem::Incremental { vjp, .. }) => {
+                *vjp = Some(Arc::new(product))
+            }
+            _ => self.wrong = Some(
+                "only functions take a gradient; distributions and likelihoods define their own"
+                    .into(),
+            ),
+        }
+        if let Some(f) = &self.builtin.host {
+            self.builtin.derivative = f.entry().1;
+        }
+        self
+    }
+
+    /// Declares that the derivative is zero wherever it exists, as for counting,
+    /// comparing and rounding.
+    #[must_use]
+    pub fn flat(mut self) -> Entry {
+        match &self.builtin.host {
+            Some(HostItem::Function { .. } | HostItem::Incremental { .. }) => {
+                self.builtin.derivative = Derivative::Zero
+            }
+            _ => self.wrong = Some("only functions can be flat".into()),
+        }
+        self
+    }
+
+    /// An example of its use, for `doc`: an expression with its value behind `//`, or a
+    /// program.
+    ///
+    /// ```
+    /// use pcadlang::Value;
+    /// use pcadlang::host::{Entry, Host, Type};
+    /// let half = Entry::function("half", |a| Ok(Value::Num(0.5 * a.num(0)?)))
+    ///     .argument("x", Type::Num, "A number.")
+    ///     .example("half(3) // 1.5");
+    /// assert!(Host::new().with(half).doc("half").unwrap().contains("half(3) // 1.5"));
+    /// ```
+    #[must_use]
+    pub fn example(mut self, text: impl Into<Cow<'static, str>>) -> Entry {
+        self.builtin.example = Some(text.into());
+        self
+    }
+
+    /// It takes the place of the language's own of that name.
+    ///
+    /// ```
+    /// use pcadlang::host::{Entry, Host, Type};
+    /// use pcadlang::{Program, Value};
+    /// let sqrt = || Entry::function("sqrt", |a| Ok(Value::Num(a.num(0)?.abs().sqrt()))).argument("x", Type::Num, "A number.");
+    /// let program = || Program::parse("let x = sqrt(-4);");
+    /// let taken = program()?.host(&Host::new().with(sqrt())).err().unwrap();
+    /// assert!(taken.to_string().contains("`sqrt` is a built-in of the language"));
+    /// assert!(program()?.host(&Host::new().with(sqrt().replacing()))?.compile().is_ok());
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
+    #[must_use]
+    pub fn replacing(mut self) -> Entry {
+        self.replaces = true;
+        self
+    }
+
+    fn push(mut self, argument: Argument) -> Entry {
+        self.builtin.args = self.builtin.args.iter().cloned().chain([argument]).collect();
+        self
+    }
+
+    /// Returns the mistakes in the declaration of the arguments.
+    pub(super) fn check_arguments(&self) -> Vec<String> {
+        let (name, args) = (&self.builtin.name, &self.builtin.args);
+        let mut wrong = Vec::new();
+        for (i, a) in args.iter().enumerate() {
+            let (own, before) = (&a.name, &args[..i]);
+            if !is_name(own) || is_keyword(own) {
+                wrong.push(format!("`{own}`, an argument of `{name}`, is not a valid name"));
+            }
+            if before.iter().any(|b| b.name == *own) {
+                wrong.push(format!("`{name}` has two arguments `{own}`"));
+            }
+            if a.default.is_none() && before.iter().any(|b| b.default.is_some()) {
+                wrong.push(format!(
+                    "`{name}`: the required argument `{own}` must come before the optional ones"
+                ));
+            }
+        }
+        wrong
+    }
+}
+
+/// A built-in of plain functions, which capture nothing.
+impl From<&Row> for Entry {
+    fn from(row: &Row) -> Entry {
+        Entry { builtin: row.into(), replaces: false, wrong: None }
+    }
+}
+
+const HOST: &str = "Of the host";

@@ -1,0 +1,160 @@
+//! Functions, distributions, likelihoods and kernels that a host program adds to the
+//! language.
+//!
+//! A [`Host`] is a list of [`Entry`]s. They join the table of built-ins, so that static
+//! checks, error messages, completion and `doc` treat them like those of the language.
+//!
+//! ```
+//! use pcadlang::host::{Adjoint, Entry, Host, Type};
+//! use pcadlang::{Program, Value};
+//! // A drag function with a captured constant and its derivative.
+//! let density = 1.2;
+//! let drag = Entry::function("drag", move |a| Ok(Value::Num(0.5 * density * a.num(0)? * a.num(0)?)))
+//!     .argument("speed", Type::Num, "How fast it moves.").unit("m/s")
+//!     .returns(Type::Num)
+//!     .about("The drag of a unit area.")
+//!     .gradient(move |a, _, by| Some(vec![Adjoint::Num(by.number() * density * a.num(0).ok()?)]));
+//! let host = Host::new().with(drag);
+//! let text = "assume v ~ normal(10, 2); observe normal(drag(v), 1) = 55; infer { warmup 200 { hmc(@v); } repeat 500 { hmc(@v); } }";
+//! let model = Program::parse(text)?.host(&host)?.compile()?;
+//! let posterior = model.run(&Default::default(), 1, 1)?;
+//! let v = posterior.quantity("v").unwrap().summary.mean;
+//! assert!((v - 9.57).abs() < 0.1, "{v}");
+//!
+//! assert!(host.doc("drag").unwrap().contains("number, m/s."));
+//! let wrong = Program::parse("let d = drag(speeed = 1);")?.host(&host)?.compile().unwrap_err();
+//! assert!(wrong.to_string().contains("did you mean `speed`?"));
+//! # Ok::<(), pcadlang::Error>(())
+//! ```
+
+mod checked;
+mod entry;
+mod previous;
+
+#[doc(inline)]
+pub use crate::KernelCall;
+pub use entry::Entry;
+#[doc(inline)]
+pub use pcadlang_engine::lang::adjoint::Adjoint;
+#[doc(inline)]
+pub use pcadlang_engine::lang::builtins::data::{
+    Beside, DataFormat, Literal, Options as DataOptions,
+};
+#[doc(inline)]
+pub use pcadlang_engine::lang::builtins::{Args, Defaults, InputHook, Type};
+#[doc(inline)]
+pub use pcadlang_engine::lang::error::{Fault, FaultKind};
+#[doc(inline)]
+pub use pcadlang_engine::lang::value::{Likelihood, Located, Object};
+#[doc(inline)]
+pub use pcadlang_numerics::dist::{Datum, Distribution, Gradient, ParamError, Support};
+pub use previous::Previous;
+
+use pcadlang_engine::lang::builtins::{Builtin, Table, doc};
+use pcadlang_syntax::diag::{Diagnostic, Error, Severity, SourceMap};
+use pcadlang_syntax::{is_keyword, is_name};
+use std::sync::Arc;
+
+/// The items that a host registers; see the [module](self).
+#[derive(Clone, Default)]
+pub struct Host {
+    entries: Vec<Entry>,
+    hooks: Vec<Arc<dyn InputHook>>,
+}
+
+impl Host {
+    /// Creates an empty host.
+    pub fn new() -> Host {
+        Host::default()
+    }
+
+    /// Adds an entry.
+    #[must_use]
+    pub fn with(mut self, entry: Entry) -> Host {
+        self.entries.push(entry);
+        self
+    }
+
+    /// Adds a hook that prepares the inputs of programs before they are compiled.
+    ///
+    /// ```
+    /// use indexmap::IndexMap;
+    /// use pcadlang::host::{Defaults, Host, InputHook};
+    /// use pcadlang::{Program, Value};
+    /// use std::sync::Arc;
+    /// /// Gives programs the number of seconds in a day as `day`, unless they have one.
+    /// #[derive(Debug)]
+    /// struct Day;
+    /// impl InputHook for Day {
+    ///     fn prepare(&self, data: &mut IndexMap<String, Value>, _: &mut Defaults) {
+    ///         data.entry("day".into()).or_insert(Value::Num(86_400.0));
+    ///     }
+    ///     fn adapt(&self, value: Value, _: &Defaults) -> Value {
+    ///         value
+    ///     }
+    /// }
+    /// let host = Host::new().hook(Arc::new(Day));
+    /// let model = Program::parse("data day; predict t ~ uniform(0, day);")?.host(&host)?.compile()?;
+    /// assert!(model.simulate(1, 0).is_ok());
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
+    #[must_use]
+    pub fn hook(mut self, hook: Arc<dyn InputHook>) -> Host {
+        self.hooks.push(hook);
+        self
+    }
+
+    /// These built-ins and the host's, unchecked.
+    pub fn added_to(&self, own: &Table) -> Table {
+        let mut table = own.clone().with(self.entries.iter().map(|e| Builtin::clone(&e.builtin)));
+        table.hooks.extend(self.hooks.iter().cloned());
+        table
+    }
+
+    /// These built-ins and the host's.
+    ///
+    /// # Errors
+    /// A name that is none or taken, arguments that cannot be told apart, a gradient of
+    /// what is no function: all of them.
+    pub fn table(&self, own: &Table) -> Result<Arc<Table>, Error> {
+        let mut diagnostics = Vec::new();
+        let mut wrong = |message: String, hint: &str| {
+            let d = Diagnostic::new(Severity::Error, message);
+            diagnostics.push(if hint.is_empty() { d } else { d.hint(hint) });
+        };
+        for (i, e) in self.entries.iter().enumerate() {
+            let (b, name) = (&e.builtin, &*e.builtin.name);
+            let taken = own.find(&b.module, name).is_some() || own.constant(name).is_some();
+            if !is_name(name) || is_keyword(name) {
+                wrong(
+                    format!("`{name}` is not a valid name for a host function"),
+                    "a name is a letter or `_`, then letters, digits and `_`, and not a keyword",
+                );
+            } else if own.constant(name).is_some() || taken && !e.replaces {
+                wrong(
+                    format!("`{name}` is a built-in of the language"),
+                    "choose another name; functions can be `replacing()`",
+                );
+            } else if self.entries[..i]
+                .iter()
+                .any(|o| o.builtin.name == b.name && o.builtin.module == b.module)
+            {
+                wrong(format!("the host registers `{name}` twice"), "");
+            }
+            if let Some(what) = &e.wrong {
+                wrong(format!("`{name}`: {what}"), "");
+            }
+            e.check_arguments().into_iter().for_each(|message| wrong(message, ""));
+        }
+        match diagnostics.is_empty() {
+            true => Ok(Arc::new(self.added_to(own))),
+            false => Err(Error { diagnostics, sources: SourceMap::new() }),
+        }
+    }
+
+    /// What `pcadlang doc` says of a name: the host's own, or the engine's. `None` also
+    /// where an entry is not valid.
+    pub fn doc(&self, name: &str) -> Option<String> {
+        doc::doc(&*self.table(&Table::default()).ok()?, name)
+    }
+}

@@ -1,0 +1,297 @@
+//! Initial states: traces of positive probability, and an explanation when none is found.
+
+use super::kernel::StepContext;
+use super::kernels::ProgramKernel;
+use pcadlang_engine::lang::address::Address;
+use pcadlang_engine::lang::code::Code;
+use pcadlang_engine::lang::error::RunError;
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Change, Constraint, Draws, Limits, Target, Trace, TraceResult};
+use pcadlang_numerics::platform::clock::Instant;
+use pcadlang_numerics::rng::{Purpose, StreamKey};
+use pcadlang_syntax::span::Span;
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How a chain starts: from the best of a number of draws from the prior, by log joint
+/// density.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Start {
+    /// The number of draws of positive probability.
+    pub draws: u64,
+    /// How many of the best are kept: with more than one, warm-up begins with a
+    /// population that anneals.
+    pub keep: usize,
+    /// A time limit: once a draw has succeeded, no further ones are made after it.
+    pub within: Option<Duration>,
+}
+
+impl Default for Start {
+    fn default() -> Self {
+        Start { draws: 1, keep: 1, within: None }
+    }
+}
+
+/// How many draws from the prior may have zero probability before that is an error.
+const RETRIES: u64 = 1000;
+
+/// Why a chain cannot start.
+#[derive(Debug, Clone)]
+pub enum StartError {
+    /// The program failed.
+    Run(Box<RunError>),
+    /// Every draw had probability zero.
+    Impossible(NoStart),
+}
+
+/// What has zero probability in the last draw.
+#[derive(Debug, Clone, Default)]
+pub struct NoStart {
+    /// Observations and factors first, then choices.
+    pub terms: Vec<ZeroTerm>,
+    /// The first choices of that draw that are single numbers or truth values, with their
+    /// values.
+    pub drawn: Vec<(Address, Value)>,
+}
+
+/// A term of the joint density whose logarithm is -∞.
+#[derive(Debug, Clone)]
+pub struct ZeroTerm {
+    /// Its address.
+    pub address: Address,
+    /// Its position in the program.
+    pub span: Span,
+    /// An observed value outside of the support of its distribution.
+    pub outside: Option<String>,
+}
+
+impl fmt::Display for NoStart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "all {RETRIES} draws from the prior have probability zero")
+    }
+}
+
+/// Returns the first of at most `most` draws that does not fail with a recoverable error.
+///
+/// # Errors
+/// The last attempt's error, or the first one that is not recoverable.
+pub fn attempts<T>(most: u64, mut draw: impl FnMut(u64) -> TraceResult<T>) -> TraceResult<T> {
+    let mut attempt = 0;
+    loop {
+        match draw(attempt) {
+            Err(e) if e.is_recoverable() && attempt + 1 < most => attempt += 1,
+            done => return done,
+        }
+    }
+}
+
+/// Draws from the prior and discards the draw, so that values which are computed once and
+/// cached with the data are ready. An error is ignored: the chains will report it.
+pub(super) fn draw_once(code: &Arc<Code>, seed: u64, limits: Limits) {
+    let draws = Draws { key: StreamKey::new(seed, 0, Purpose::START), step: 0, substream: 0 };
+    let _ = Trace::simulate(Arc::clone(code), draws, limits);
+}
+
+/// The traces a chain starts with, the best first: `how.keep` of them, or fewer if fewer
+/// draws succeed.
+///
+/// # Errors
+/// If the program fails, or if no draw has positive probability within a bounded number
+/// of attempts.
+pub fn starts(
+    code: &Arc<Code>,
+    seed: u64,
+    chain: u32,
+    how: Start,
+    limits: Limits,
+) -> Result<Vec<Trace>, StartError> {
+    starts_from(code, (seed, chain), how, None, limits)
+}
+
+/// As [`starts`], but each draw is moved to what a kernel of the program proposes from
+/// it. If that does not depend on the draw, the draw is made with the values that the
+/// kernel proposes, so that each is compared with the observations once.
+pub(crate) fn starts_from(
+    code: &Arc<Code>,
+    (seed, chain): (u64, u32),
+    how: Start,
+    from: Option<&ProgramKernel>,
+    limits: Limits,
+) -> Result<Vec<Trace>, StartError> {
+    let mut begun = Instant::now();
+    let key = StreamKey::new(seed, chain, Purpose::START);
+    let mut source = Source { code, seed, chain, key, from, limits: &limits, last: None };
+    let mut best: Vec<Trace> = Vec::new();
+    let mut found = 0;
+    let mut last = None;
+    for attempt in 0..how.draws.saturating_add(RETRIES) {
+        let draw = source.draw(attempt);
+        if attempt == 0 {
+            // One-time preparation, such as the analysis of a photograph, does not count
+            // against the time limit.
+            begun = Instant::now();
+        }
+        match draw {
+            Ok(None) => {}
+            Ok(Some(t)) if t.log_joint() > f64::NEG_INFINITY => {
+                found += 1;
+                let place = best.partition_point(|b| b.log_joint() >= t.log_joint());
+                if place < how.keep.max(1) {
+                    best.insert(place, t.into_owned());
+                    best.truncate(how.keep.max(1));
+                }
+            }
+            Ok(Some(t)) if found == 0 => last = Some(Ok(t.into_owned())),
+            Ok(Some(_)) => {}
+            Err(e) if e.is_recoverable() => last = Some(Err(e)),
+            Err(e) => return Err(StartError::Run(e)),
+        }
+        let late = || how.within.is_some_and(|t| begun.elapsed() >= t);
+        if found > 0 && (limits.stop.is_asked() || late()) || found == 0 && attempt + 1 >= RETRIES {
+            break;
+        }
+        // Once there is a state to start from, failed attempts count as draws too.
+        if found >= how.draws || (found > 0 && attempt + 1 >= how.draws) {
+            break;
+        }
+    }
+    match last {
+        _ if !best.is_empty() => Ok(best),
+        Some(Ok(t)) => Err(StartError::Impossible(explain(&t))),
+        Some(Err(e)) => Err(StartError::Run(e)),
+        None => Err(StartError::Impossible(NoStart::default())),
+    }
+}
+
+/// Where draws come from.
+struct Source<'a> {
+    code: &'a Arc<Code>,
+    seed: u64,
+    chain: u32,
+    key: StreamKey,
+    from: Option<&'a ProgramKernel>,
+    limits: &'a Limits,
+    /// The last draw, of which the next is an update, if the kernel's proposal does not
+    /// depend on the draw.
+    last: Option<Trace>,
+}
+
+impl Source<'_> {
+    /// Makes a draw; `None` if the program is undefined where the kernel leads.
+    fn draw(&mut self, attempt: u64) -> TraceResult<Option<Cow<'_, Trace>>> {
+        let draws = Draws { key: self.key, step: attempt, substream: 0 };
+        let simulate = || Trace::simulate(Arc::clone(self.code), draws, self.limits.clone());
+        let Some(from) = self.from else { return Ok(Some(Cow::Owned(simulate()?))) };
+        // Steps of the plan count from 0: this part is distinct from all of them.
+        let at = StepContext::new(self.seed, self.chain, attempt).within(u64::MAX - 1);
+        let Some(mut last) = self.last.take() else {
+            let mut trace = simulate()?;
+            if from.ignores_the_state() {
+                self.last = Some(trace.clone());
+            }
+            return Ok(from.leap(&mut trace, &at)?.map(|()| Cow::Owned(trace)));
+        };
+        let given = from.proposal(&mut last, &at)?;
+        if !redrawn(&mut last, &given, draws) {
+            last = Trace::generate(Arc::clone(self.code), given, draws, self.limits.clone())?.0;
+        }
+        Ok(Some(Cow::Borrowed(self.last.insert(last))))
+    }
+}
+
+/// Draws all choices of a trace again, except for those that are given, by an update with the
+/// same result as [`Trace::generate`]; false, with the trace as it was, if the update fails.
+fn redrawn(trace: &mut Trace, given: &[(u64, Constraint)], draws: Draws) -> bool {
+    let change = |t: &Target| {
+        let hash = trace.address_hash(*t);
+        match given.iter().find(|(of, _)| *of == hash) {
+            Some((_, Constraint::Value(x))) => (*t, Change::Value(x.clone())),
+            Some((_, Constraint::Stored(x))) => (*t, Change::Set(x.clone())),
+            None => (*t, Change::Resample),
+        }
+    };
+    let changes: Vec<_> = trace.all_targets().iter().map(change).collect();
+    let done = trace.propose(&changes, draws).is_ok();
+    if done {
+        trace.commit()
+    } else {
+        trace.rollback()
+    }
+    done
+}
+
+/// The terms of a trace that have zero probability.
+fn explain(t: &Trace) -> NoStart {
+    let mut outside: HashMap<Address, String> = t.outside_support().into_iter().collect();
+    let zero = t.impossible().into_iter();
+    let zero =
+        zero.map(|(address, span)| ZeroTerm { outside: outside.remove(&address), address, span });
+    let single = |(address, value, _): (Address, Value, _)| match value {
+        Value::Num(_) | Value::Bool(_) => Some((address, value)),
+        _ => None,
+    };
+    NoStart {
+        terms: zero.collect(),
+        drawn: t.choices().into_iter().filter_map(single).take(6).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pcadlang_library::model::Model;
+
+    /// Draws by updates of the draw before are those from scratch, also of choices that
+    /// appear and vanish.
+    #[test]
+    fn draws_by_updates_are_those_from_scratch() {
+        let text = "assume open ~ flip(0.5);
+            fn wall() { thick ~ normal(0, 1); floor ~ iid(beta(2, 2), 3); thick + floor[0] }
+            assume inside = if open { wall() } else { 0 };
+            assume f ~ gp(mean = 0, cov = sq_exp(1, 0.5), at = [0, 0.5, 1]);
+            assume x ~ normal(inside, 1);
+            observe normal(f + x, 0.5) = [1, 2, 0];
+            let n = 2 + 1;
+            kernel near(m) { propose s ~ flip(0.5); propose @x ~ normal(m + (if s { 1 } else { 0 }), 0.1);
+              propose @f ~ mv_normal([0, m, 0], chol = 0.1 * identity(n)); propose @open ~ flip(0.7); }
+            infer { init(best_of(30, keep = 5, from = near(2))); repeat 1 { drift(@x); } }";
+        let model = Model::from_text(text).unwrap();
+        let (plan, _) = model.plan().unwrap();
+        let kernels: Arc<[_]> = Arc::clone(&plan.kernels);
+        let from = ProgramKernel::new(kernels, 0, vec![Value::Num(2.0)], Instant::now());
+        assert!(from.ignores_the_state());
+        let key = StreamKey::new(7, 0, Purpose::START);
+        let limits = Limits::default();
+        let (code, from) = (model.code(), Some(&from));
+        let mut source = Source { code, seed: 7, chain: 0, key, from, limits: &limits, last: None };
+        // What depends on a choice is another matter.
+        let other = text.replace("normal(m +", "normal(m + x +");
+        let (plan, _) = Model::from_text(&other).unwrap().plan().unwrap();
+        let own = ProgramKernel::new(Arc::clone(&plan.kernels), 0, Vec::new(), Instant::now());
+        assert!(!own.ignores_the_state());
+        let mut opened = 0;
+        for attempt in 0..40 {
+            let found = source.draw(attempt).unwrap().unwrap().into_owned();
+            let draws = Draws { key, step: attempt, substream: 0 };
+            if attempt == 0 {
+                continue;
+            }
+            let at = StepContext::new(7, 0, attempt).within(u64::MAX - 1);
+            let given = from.unwrap().proposal(&mut found.clone(), &at).unwrap();
+            let scratch =
+                Trace::generate(Arc::clone(code), given, draws, limits.clone()).unwrap().0;
+            let choices = |t: &Trace| {
+                let mut all = t.constraints();
+                all.sort_by_key(|(hash, _)| *hash);
+                all
+            };
+            assert_eq!(choices(&found), choices(&scratch), "{attempt}");
+            assert_eq!(found.log_joint().to_bits(), scratch.log_joint().to_bits(), "{attempt}");
+            opened += u32::from(found.constraints().len() > 3);
+        }
+        assert!(opened > 10 && opened < 39, "{opened}");
+    }
+}

@@ -1,0 +1,148 @@
+//! `abc(move, eps)`: approximate Bayesian computation by Markov chain Monte Carlo
+//! (Marjoram et al. 2003).
+//!
+//! The inner kernel proposes as if nothing were observed. Then all observations are
+//! redrawn from their own distributions, and the proposal is accepted if the simulated
+//! data are close enough to the observed data. The densities of the observations play no
+//! part. The chain draws from the prior given that simulated data come within `eps` of
+//! the observed data: the posterior, as `eps` goes to 0. The distance is the root mean
+//! square of the differences between the observed and the simulated numbers.
+
+use crate::calls::error::fail;
+use crate::kernel::{Kernel, Outcome, StepContext};
+use crate::state::{StateError, pack, unpack};
+use pcadlang_engine::lang::code::Observed;
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Draws, Trace, TraceResult};
+use pcadlang_syntax::span::Span;
+use std::sync::Arc;
+
+/// Likelihood-free Metropolis-Hastings with a reversible inner kernel that leaves the
+/// prior invariant.
+pub struct Abc {
+    kernel: Box<dyn Kernel>,
+    eps: f64,
+    /// The distance at which the present state was accepted. It is above `eps` until a
+    /// state comes close enough.
+    distance: f64,
+    /// The data that it is a distance from.
+    observed: Option<Arc<Observed>>,
+    /// Whether the distance comes from a checkpoint; it then refers to the data that the
+    /// trace observes at the next step.
+    loaded: bool,
+    span: Span,
+}
+
+impl Abc {
+    /// `kernel` is the inner kernel, `eps` the largest distance; `span` is the position
+    /// that errors refer to.
+    pub fn new(kernel: Box<dyn Kernel>, eps: f64, span: Span) -> Self {
+        Abc { kernel, eps, distance: f64::INFINITY, observed: None, loaded: false, span }
+    }
+}
+
+/// Makes one step of the inner kernel under the prior, and keeps it if data simulated in
+/// the new state are within `eps`; `distance` is that of the present state.
+pub(super) fn step_within(
+    kernel: &mut dyn Kernel,
+    trace: &mut Trace,
+    at: &StepContext,
+    (distance, eps): (&mut f64, f64),
+    span: Span,
+) -> TraceResult<Outcome> {
+    if kernel.sweep(trace).is_some() {
+        return Err(fail(span, "abc takes a kernel that makes a single step, not each(…)".into()));
+    }
+    let before = trace.constraints();
+    let inner = kernel.step(trace, &StepContext { power: 0.0, ..at.within(0) })?;
+    if inner.accepted == 0 && *distance <= eps {
+        return Ok(Outcome::one(false));
+    }
+    let new = simulate(trace, at.within(1).draws(0), span)?;
+    let near = new <= eps;
+    if near {
+        *distance = new;
+    } else {
+        trace.restore(&before, at.within(2).draws(0))?;
+    }
+    Ok(Outcome { accepted: u32::from(near), proposals: 1, ..inner })
+}
+
+/// Returns the distance between data simulated in this state and the observed data.
+pub(super) fn simulate(trace: &Trace, draws: Draws, span: Span) -> TraceResult<f64> {
+    let replicate = trace.replicate(draws)?;
+    if let Some((address, what)) = replicate.silent.first() {
+        return Err(fail(
+            span,
+            format!(
+                "abc simulates all observations, but {address} is {what}, which has no sampler"
+            ),
+        ));
+    }
+    let observed = trace.observed();
+    let (mut squares, mut count) = (0.0, 0.0);
+    for o in &observed {
+        let Some((_, drawn)) = replicate.values.iter().find(|(hash, _)| *hash == o.hash) else {
+            continue;
+        };
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        if !numbers(&o.value, &mut a) || !numbers(drawn, &mut b) || a.len() != b.len() {
+            return Err(fail(
+                span,
+                format!("abc compares numbers, but {} is {}", o.address, o.value.type_name()),
+            ));
+        }
+        squares += a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+        count += a.len() as f64;
+    }
+    let distance = (squares / f64::max(count, 1.0)).sqrt();
+    Ok(if distance.is_nan() { f64::INFINITY } else { distance })
+}
+
+/// Collects the numbers in a value; false if it contains anything else.
+fn numbers(v: &Value, out: &mut Vec<f64>) -> bool {
+    match v {
+        Value::Num(x) => out.push(*x),
+        Value::Bool(b) => out.push(f64::from(u8::from(*b))),
+        Value::Array(xs) => out.extend(xs.iter()),
+        Value::List(xs) => return xs.iter().all(|x| numbers(x, out)),
+        _ => return false,
+    }
+    true
+}
+
+impl Kernel for Abc {
+    fn name(&self) -> String {
+        "abc".into()
+    }
+
+    fn save(&self, trace: &Trace) -> Vec<u8> {
+        pack(&(self.kernel.save(trace), self.distance, self.loaded || self.observed.is_some()))
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        let inner: Vec<u8>;
+        (inner, self.distance, self.loaded) = unpack(state)?;
+        self.observed = None;
+        self.kernel.load(&inner)
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
+        if std::mem::take(&mut self.loaded) {
+            self.observed = Some(Arc::clone(trace.replacements()));
+        }
+        let same = self.observed.as_ref().is_some_and(|o| Arc::ptr_eq(o, trace.replacements()));
+        if !same {
+            // The distance refers to other data.
+            trace.rollback();
+            self.distance = match self.observed {
+                Some(_) => simulate(trace, at.within(3).draws(0), self.span)?,
+                None => f64::INFINITY,
+            };
+            self.observed = Some(Arc::clone(trace.replacements()));
+        }
+        // Until a state is close enough, any closer one is accepted.
+        let eps = if self.distance > self.eps { self.distance } else { self.eps };
+        step_within(&mut *self.kernel, trace, at, (&mut self.distance, eps), self.span)
+    }
+}

@@ -1,0 +1,133 @@
+//! `delayed(move, at)`: delayed acceptance (Christen & Fox 2005) in the form of surrogate
+//! transitions (Liu 2001, section 9.4.3).
+//!
+//! Beside the chain's trace there is a second one, in which the coarse surrogates of the
+//! observations at `at` replace them. The inner kernel moves the surrogate trace, with
+//! its own acceptance test; only moves that it accepts are proposed to the chain's trace,
+//! where the ratio (fine change / coarse change) decides. With any inner kernel that is
+//! reversible under the surrogate this leaves the posterior invariant, however poor the
+//! surrogate is, as long as it has positive density wherever the observation has. The
+//! observation itself is evaluated only for moves that pass the first stage.
+
+use crate::calls::error::fail;
+use crate::kernel::{Kernel, Outcome, StepContext, accept_or_reject, recoverable};
+use crate::state::StateError;
+use pcadlang_engine::lang::error::RunError;
+use pcadlang_engine::trace::{Selector, Trace, TraceResult};
+use pcadlang_syntax::span::Span;
+
+/// Two-stage acceptance with a reversible inner kernel.
+pub struct Delayed {
+    kernel: Box<dyn Kernel>,
+    /// The observations whose surrogates are used in the first stage.
+    observations: Selector,
+    span: Span,
+    /// The trace under the surrogates.
+    surrogate: Option<Trace>,
+}
+
+impl Delayed {
+    /// `observations` are those that have surrogates; `span` is the position that errors
+    /// refer to.
+    pub fn new(kernel: Box<dyn Kernel>, observations: Selector, span: Span) -> Self {
+        Delayed { kernel, observations, span, surrogate: None }
+    }
+
+    /// Moves the surrogate trace to the present state.
+    fn follow(&mut self, trace: &mut Trace) -> TraceResult<&mut Trace> {
+        trace.rollback();
+        let mut surrogate = match self.surrogate.take() {
+            Some(surrogate) => surrogate,
+            None => {
+                trace.under_surrogates(&self.observations)?.ok_or_else(|| self.nothing_coarse())?
+            }
+        };
+        surrogate.observe_as(trace)?;
+        surrogate.propose_choices_of(trace)?;
+        surrogate.commit();
+        if let Some(extra) = trace.lacks(&surrogate) {
+            let address = surrogate.address(extra);
+            return Err(fail(
+                self.span,
+                format!("delayed: only the surrogate depends on the choice {address}"),
+            ));
+        }
+        Ok(self.surrogate.insert(surrogate))
+    }
+
+    fn nothing_coarse(&self) -> Box<RunError> {
+        let mut e =
+            fail(self.span, "delayed: no selected observation has a coarse surrogate".into());
+        e.hint = Some(
+            "observe normal(x, 1) = 2 with coarse = normal(x, 2) as y; … delayed(…, @y)".into(),
+        );
+        e
+    }
+}
+
+/// The log prior plus the log likelihood raised to a power.
+fn tempered(trace: &Trace, power: f64) -> f64 {
+    let likelihood = if power == 0.0 { 0.0 } else { power * trace.log_likelihood() };
+    trace.log_prior() + likelihood
+}
+
+impl Kernel for Delayed {
+    fn name(&self) -> String {
+        format!("delayed {}", self.kernel.name())
+    }
+
+    fn save(&self, trace: &Trace) -> Vec<u8> {
+        self.kernel.save(self.surrogate.as_ref().unwrap_or(trace))
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        self.kernel.load(state)
+    }
+
+    fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
+        // Errors are reported by the step.
+        self.follow(trace).ok()?;
+        self.kernel.sweep(self.surrogate.as_mut()?)
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
+        self.follow(trace)?;
+        let Some(surrogate) = &mut self.surrogate else { return Ok(Outcome::default()) };
+        let before = tempered(surrogate, at.power);
+        let beyond = trace.beyond(surrogate);
+        let inner =
+            self.kernel.step(surrogate, &StepContext { member: at.member, ..at.within(0) })?;
+        surrogate.rollback();
+        if inner.accepted == 0 {
+            return Ok(Outcome { site: None, ..inner });
+        }
+        let coarse = tempered(surrogate, at.power) - before;
+        let mut outcome = match recoverable(trace.propose_choices_of(surrogate))? {
+            None => Outcome { accepted: 0, failed: 1, ..inner },
+            Some(w) => {
+                let fine = if at.power == 1.0 {
+                    w.log_joint
+                } else {
+                    w.log_joint - (1.0 - at.power) * w.log_likelihood
+                };
+                // Choices that only the observation depends on must not change: the ratio
+                // does not account for new ones.
+                let same = trace.lacks(surrogate).is_none()
+                    && trace.beyond(surrogate) == beyond
+                    && !trace.takes_away(&beyond);
+                let decided = accept_or_reject(
+                    trace,
+                    if same { fine - coarse } else { f64::NEG_INFINITY },
+                    &mut at.stream(),
+                );
+                Outcome { accepted: decided.accepted.min(inner.accepted), ..inner }
+            }
+        };
+        if outcome.accepted == 0 {
+            surrogate.propose_choices_of(trace)?;
+            surrogate.commit();
+        }
+        outcome.site = None;
+        Ok(outcome)
+    }
+}

@@ -1,0 +1,215 @@
+//! Gibbs updates of finite discrete choices by enumeration, in log space.
+//!
+//! If no value makes other choices appear or vanish, the new value comes from its exact
+//! conditional. Otherwise the weight of a value is that of a single draw of the choices
+//! that appear with it, and the move is a multiple-try Metropolis step as in Liu, Liang &
+//! Wong (2000), with one try per value: the acceptance ratio uses the weights around the
+//! new state, with fresh draws for all values but the old one.
+
+use crate::kernel::{
+    Kernel, Outcome, Registered, SiteSelection, StepContext, accepts, recoverable,
+};
+use pcadlang_engine::trace::{Change, Target, Trace, TraceResult};
+use pcadlang_numerics::dist::{Datum, Dist};
+use pcadlang_numerics::num::log_sum_exp;
+use pcadlang_numerics::rng::Stream;
+
+/// `gibbs(sel)`: draws one choice from its distribution given all others.
+#[derive(Clone, Debug)]
+pub struct Gibbs {
+    scope: Registered,
+    /// The values of the choice, their log weights, and the weights relative to the
+    /// largest; kept between steps to avoid allocations.
+    values: Vec<Datum>,
+    log: Vec<f64>,
+    weights: Vec<f64>,
+}
+
+/// Properties of the weighed values of a choice.
+#[derive(Clone, Copy, Debug, Default)]
+struct Weighed {
+    /// Whether any of them changes the set of choices.
+    structural: bool,
+    failed: u32,
+    /// The value whose proposal is pending.
+    pending: Option<usize>,
+}
+
+impl Gibbs {
+    /// A kernel for one of these choices at a time.
+    pub fn new(scope: SiteSelection) -> Self {
+        let scope = Registered::new(scope.single());
+        Gibbs { scope, values: Vec::new(), log: Vec::new(), weights: Vec::new() }
+    }
+
+    /// Computes the log weights of all values, relative to the state with value `old`,
+    /// without updating the trace; `None` if that needs updates.
+    fn weigh_beside(
+        &mut self,
+        trace: &Trace,
+        at: &StepContext,
+        target: Target,
+        dist: &Dist,
+        old: usize,
+    ) -> Option<Weighed> {
+        let log = &mut self.log;
+        log.clear();
+        let number = |w: f64| log.push(if w.is_nan() { f64::NEG_INFINITY } else { w });
+        trace
+            .weigh_values(target, dist, (&self.values, old), at.power, number)
+            .then(Weighed::default)
+    }
+
+    /// As [`Gibbs::weigh_beside`], by updates. `ways` is minus the log probability of
+    /// picking the choice in the present state; value `i` uses the substream
+    /// `first_substream + i`.
+    fn weigh(
+        &mut self,
+        trace: &mut Trace,
+        at: &StepContext,
+        target: Target,
+        old: usize,
+        (ways, first_substream): (f64, u64),
+    ) -> TraceResult<Weighed> {
+        let mut weighed = Weighed::default();
+        self.log.clear();
+        for (i, v) in self.values.iter().enumerate() {
+            if i == old {
+                self.log.push(0.0);
+                continue;
+            }
+            let change = [(target, Change::Set(v.clone()))];
+            match recoverable(trace.propose(&change, at.draws(first_substream + i as u64)))? {
+                Some(w) => {
+                    let log = at.tempered(&w) + (ways - self.scope.reverse_selection(trace));
+                    self.log.push(if log.is_nan() { f64::NEG_INFINITY } else { log });
+                    weighed.structural |= w.appeared > 0 || w.vanished > 0;
+                    weighed.pending = Some(i);
+                }
+                None => {
+                    self.log.push(f64::NEG_INFINITY);
+                    weighed.failed += 1;
+                    weighed.pending = None;
+                }
+            }
+        }
+        Ok(weighed)
+    }
+}
+
+impl Kernel for Gibbs {
+    fn name(&self) -> String {
+        "gibbs".into()
+    }
+
+    fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
+        self.scope.sweep(trace)
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
+        let mut rng = at.stream();
+        let Some((target, n)) = self.scope.pick(trace, at, &mut rng) else {
+            return Ok(Outcome::default());
+        };
+        let stored = trace.stored(target);
+        let Some(dist) = trace.dist(target).filter(|d| d.support().list_values(&mut self.values))
+        else {
+            return Ok(Outcome::default());
+        };
+        let Some(old) = self.values.iter().position(|v| Some(v) == stored.as_ref()) else {
+            return Ok(Outcome::default());
+        };
+        let forward = match self.weigh_beside(trace, at, target, &dist, old) {
+            Some(forward) => forward,
+            None => self.weigh(trace, at, target, old, (libm::log(n as f64), 0))?,
+        };
+        let chosen = sample_log(&self.log, &mut self.weights, &mut rng);
+        let mut outcome =
+            Outcome { proposals: 1, failed: forward.failed, ..Default::default() }.at(target);
+        if chosen == old {
+            trace.rollback();
+            return Ok(outcome);
+        }
+        if !forward.structural && trace.set_in_place(target, &dist, &self.values[chosen]) {
+            outcome.accepted = 1;
+            return Ok(outcome);
+        }
+        if forward.pending != Some(chosen) {
+            let change = [(target, Change::Set(self.values[chosen].clone()))];
+            // The same substream gives the same draws as when the value was weighed.
+            if recoverable(trace.propose(&change, at.draws(chosen as u64)))?.is_none() {
+                return Ok(outcome);
+            }
+        }
+        if !forward.structural {
+            trace.commit();
+            outcome.accepted = 1;
+            return Ok(outcome);
+        }
+        let (forth, log_forward) = (self.log[chosen], log_sum_exp(&self.log));
+        let removed = trace.removed();
+        trace.commit();
+        let ways = self.scope.reverse_selection(trace);
+        self.weigh(trace, at, target, chosen, (ways, self.values.len() as u64))?;
+        trace.rollback();
+        // The old state itself represents the old value: its weight relative to the new
+        // state is minus the weight of the forward move.
+        self.log[old] = -forth;
+        if accepts(log_forward - forth - log_sum_exp(&self.log), &mut rng) {
+            outcome.accepted = 1;
+        } else {
+            let undo = [(target, Change::Set(self.values[old].clone()))];
+            trace.propose_constrained(&undo, &removed, at.draws(0))?;
+            trace.commit();
+        }
+        Ok(outcome)
+    }
+}
+
+/// Draws an index with probability proportional to exp(log[i]), at least one of which is
+/// not zero.
+fn sample_log(log: &[f64], weights: &mut Vec<f64>, rng: &mut Stream) -> usize {
+    let max = log.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    weights.clear();
+    weights.extend(log.iter().map(|l| if *l == max { 1.0 } else { libm::exp(l - max) }));
+    rng.weighted(weights, weights.iter().sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Pick;
+    use pcadlang_engine::trace::{ChoiceKind, Selector};
+    use pcadlang_library::model::Model;
+
+    /// One program whose choices do not depend on the value, and one in which one of the
+    /// values has an additional choice.
+    #[test]
+    fn a_step_is_one_proposal_accepted_where_the_value_changes() {
+        let texts = [
+            "assume k ~ categorical([1, 2, 3]); observe normal(k, 1) = 1;",
+            "assume k ~ categorical([1, 2, 3]); assume m = if k == 0 { x ~ normal(0, 1); x } else { 0.5 * k };
+             observe normal(m, 1) = 1;",
+        ];
+        for text in texts {
+            let mut trace = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
+            let finite = Selector::Kind(ChoiceKind::Finite);
+            let selection = trace.select(&finite);
+            let k = trace.targets(selection)[0];
+            let mut kernel = Gibbs::new(SiteSelection { selector: finite, pick: Pick::One });
+            let mut moves = 0;
+            for step in 0..200 {
+                let before = trace.stored(k);
+                let outcome = kernel.step(&mut trace, &StepContext::new(1, 0, step)).unwrap();
+                let moved = u32::from(trace.stored(k) != before);
+                assert_eq!(
+                    (outcome.proposals, outcome.accepted, outcome.failed),
+                    (1, moved, 0),
+                    "{text}, step {step}"
+                );
+                moves += moved;
+            }
+            assert!((1..200).contains(&moves), "{text}: {moves}");
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! `hmc(sel, steps)` and `mala(sel)`: trajectories of a fixed number of leapfrog steps
+//! (Neal 2011).
+
+use super::kernel::{DIVERGENT, End, Hamiltonian, Path, Trajectory};
+use crate::kernel::{SiteSelection, accepts};
+use pcadlang_engine::trace::TraceResult;
+
+/// Hamiltonian Monte Carlo; with one step it is the Metropolis-adjusted Langevin
+/// algorithm.
+pub type Hmc = Hamiltonian<Leaps>;
+
+/// A fixed number of leapfrog steps, accepted or rejected as a whole.
+#[derive(Clone, Debug)]
+pub struct Leaps(u32);
+
+impl Hmc {
+    /// A kernel for these choices with `steps` leapfrog steps. The step size is adapted
+    /// if it is `None`.
+    pub fn new(scope: SiteSelection, steps: u32, step: Option<f64>) -> Self {
+        // The optimal acceptance rates of Langevin steps and of long trajectories
+        // (Roberts & Rosenthal 1998, Beskos et al. 2013).
+        let target = if steps == 1 { 0.574 } else { 0.8 };
+        Hamiltonian::along(Leaps(steps.max(1)), scope, target, step)
+    }
+}
+
+impl Trajectory for Leaps {
+    fn name(&self) -> &'static str {
+        if self.0 == 1 { "mala" } else { "hmc" }
+    }
+
+    fn walk(&self, path: &mut Path) -> TraceResult<End> {
+        let Path { system, here, step, inverse_mass, rng } = path;
+        // A random length, so that trajectories do not keep returning to their starting
+        // point.
+        let step = *step * (0.9 + 0.2 * rng.uniform());
+        let mut point = system.launch(here, inverse_mass, rng);
+        let energy = point.kinetic(inverse_mass);
+        let mut there = true;
+        for _ in 0..self.0 {
+            match system.leapfrog(&point, step, inverse_mass)? {
+                Some(to) => point = to,
+                None => {
+                    there = false;
+                    break;
+                }
+            }
+        }
+        let ratio = if there {
+            point.log_density - here.log_density + energy - point.kinetic(inverse_mass)
+        } else {
+            f64::NEG_INFINITY
+        };
+        let accepted = there && accepts(ratio, rng);
+        let divergent = ratio.is_nan() || ratio <= -DIVERGENT;
+        Ok(End {
+            to: accepted.then_some(point),
+            acceptance: libm::exp(ratio.min(0.0)),
+            failed: !there,
+            divergent,
+        })
+    }
+}

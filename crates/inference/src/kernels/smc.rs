@@ -1,0 +1,159 @@
+//! `smc(move, particles)`: a proposal by annealed sequential Monte Carlo, as in Del
+//! Moral, Doucet & Jasra (2006).
+//!
+//! Particles drawn from the prior are weighted and resampled as the power of the
+//! likelihood rises from 0 to 1, and moved by the inner kernel in between. The product of
+//! the mean weights is an unbiased estimate of the evidence. Accepting one of the final
+//! particles with the ratio of the new estimate to the old one (particle independent
+//! Metropolis-Hastings: Andrieu, Doucet & Holenstein 2010, section 2.4.2) leaves the
+//! posterior exactly invariant for any number of particles. The powers are chosen in the
+//! first run, such that the effective sample size is half the number of particles at
+//! each, and are fixed from then on.
+
+use super::particles::{Independent, ParticlePath, Prior};
+use crate::kernel::{Kernel, StepContext, inner_step};
+use crate::resampling::systematic;
+use crate::state::{StateError, holds, pack, unpack};
+use pcadlang_engine::trace::{Selector, Trace, TraceResult};
+use pcadlang_numerics::num::log_sum_exp;
+use pcadlang_syntax::span::Span;
+
+/// The most powers: a likelihood that needs more has practically no overlap with the
+/// prior.
+const MOST_POWERS: usize = 1000;
+
+/// If the largest log weight exceeds this in absolute value, weights are computed
+/// relative to it.
+const LARGE: f64 = 1e9;
+
+/// Particle independent Metropolis-Hastings with annealed particles.
+pub type Smc = Independent<Annealed>;
+
+/// Raises the power of the likelihood from 0 to 1.
+pub struct Annealed {
+    kernel: Box<dyn Kernel>,
+    particles: usize,
+    /// The powers of the likelihood, of which the last is 1; chosen in the first run.
+    powers: Vec<f64>,
+}
+
+impl Smc {
+    /// `particles` particles, moved by a kernel; frozen choices are not redrawn. `span`
+    /// is the position that errors refer to.
+    pub fn new(kernel: Box<dyn Kernel>, particles: usize, frozen: Selector, span: Span) -> Self {
+        Independent::by(Annealed { kernel, particles, powers: Vec::new() }, frozen, span)
+    }
+}
+
+impl ParticlePath for Annealed {
+    fn name(&self) -> &'static str {
+        "smc"
+    }
+
+    fn forget(&mut self) {
+        self.powers.clear();
+    }
+
+    fn save(&self, trace: &Trace) -> Vec<u8> {
+        pack(&(self.kernel.save(trace), &self.powers))
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        let (inner, powers): (Vec<u8>, Vec<f64>) = unpack(state)?;
+        holds(
+            powers.iter().all(|p| *p > 0.0) && powers.last().is_none_or(|p| *p == 1.0),
+            self.name(),
+        )?;
+        self.powers = powers;
+        self.kernel.load(&inner)
+    }
+
+    fn lead(
+        &mut self,
+        prior: &Prior,
+        trace: &mut Trace,
+        at: &StepContext,
+    ) -> TraceResult<(Vec<Trace>, f64)> {
+        let mut particles = prior.draw(trace, self.particles, at)?;
+        let find = self.powers.is_empty();
+        let (mut power, mut log_evidence, mut rung) = (0.0, 0.0, 0);
+        while power < 1.0 {
+            let likelihoods: Vec<f64> = particles.iter().map(Trace::log_likelihood).collect();
+            if find {
+                let next =
+                    if rung + 1 < MOST_POWERS { next_power(&likelihoods, power) } else { 1.0 };
+                self.powers.push(next);
+            }
+            let step = self.powers[rung] - power;
+            power = self.powers[rung];
+            rung += 1;
+            // A state of zero likelihood has zero weight at any power.
+            let gain = |l: &f64| {
+                if *l == f64::NEG_INFINITY || l.is_nan() { f64::NEG_INFINITY } else { step * l }
+            };
+            let weights: Vec<f64> = likelihoods.iter().map(gain).collect();
+            let total = log_sum_exp(&weights);
+            log_evidence += total - libm::log(self.particles as f64);
+            if total == f64::NEG_INFINITY {
+                return Ok((particles, total));
+            }
+            let within = at.within((1 << 32) + rung as u64);
+            let most = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let whole = if most.abs() > LARGE { most } else { total };
+            let shares: Vec<f64> = weights.iter().map(|w| libm::exp(w - whole)).collect();
+            let chosen = systematic(&shares, self.particles, &mut within.stream());
+            particles = chosen.into_iter().map(|i| particles[i].clone()).collect();
+            for (i, p) in particles.iter_mut().enumerate() {
+                inner_step(
+                    &mut *self.kernel,
+                    p,
+                    &StepContext { power: at.power * power, ..within.within(i as u64) },
+                )?;
+            }
+        }
+        Ok((particles, log_evidence))
+    }
+}
+
+/// The power at which the effective sample size is half the number of particles, by
+/// bisection.
+fn next_power(likelihoods: &[f64], power: f64) -> f64 {
+    // Next to large values the logarithm of their number would be lost to rounding, so
+    // they are taken relative to the largest.
+    let most =
+        likelihoods.iter().copied().filter(|l| l.is_finite()).fold(f64::NEG_INFINITY, f64::max);
+    let from = if most.abs() > LARGE { most } else { 0.0 };
+    let enough = |to: f64| {
+        let relative = |l: &f64| (to - power) * (l - from);
+        let weights: Vec<f64> =
+            likelihoods.iter().filter(|l| l.is_finite()).map(relative).collect();
+        let twice: Vec<f64> = weights.iter().map(|w| 2.0 * w).collect();
+        2.0 * log_sum_exp(&weights) - log_sum_exp(&twice)
+            >= libm::log(0.5 * weights.len().max(1) as f64)
+    };
+    if enough(1.0) {
+        return 1.0;
+    }
+    let (mut low, mut high) = (power, 1.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if enough(middle) { low = middle } else { high = middle }
+    }
+    if low > power { low } else { high }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The likelihoods are so far apart that no power gives an effective sample size of
+    /// half: the next power must rise nevertheless.
+    #[test]
+    fn powers_rise_whatever_the_likelihoods_are() {
+        for power in [0.0, 1e-3, 0.5, 1.0 - 1e-10] {
+            let next = next_power(&[0.0, -1e30, -1e30], power);
+            assert!(next > power && next < 1.0, "{power}: {next}");
+        }
+        assert_eq!(next_power(&[-3.0; 4], 0.2), 1.0);
+    }
+}

@@ -1,0 +1,109 @@
+//! Running a compiled inference block on a chain, step by step.
+
+mod apply;
+pub(super) mod banks;
+pub(super) mod checkpoint;
+mod place;
+mod resume;
+mod runner;
+mod start;
+mod warmup;
+
+use super::draws::Sink;
+use super::init::{Start, starts_from};
+use super::population::Population;
+use super::run::{ChainError, ChainResult, Progress, RunOptions};
+use pcadlang_engine::lang::code::Code;
+use pcadlang_engine::lang::plan::Plan;
+use pcadlang_engine::trace::{Limits, Trace};
+use pcadlang_numerics::platform::clock::Instant;
+use runner::Runner;
+pub(crate) use start::SharedStart;
+use start::start_of;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+/// Runs one chain of a plan, or resumes it from the checkpoint of its sink. Chains share
+/// how they start.
+///
+/// # Errors
+/// If the chain cannot start, the program or the sink fails, or the checkpoint belongs to
+/// another plan.
+pub(crate) fn run_chain(
+    code: &Arc<Code>,
+    plan: &Plan,
+    options: &RunOptions,
+    progress: &Progress,
+    sink: &mut dyn Sink,
+    chain: u32,
+    shared: &SharedStart,
+) -> Result<ChainResult, ChainError> {
+    let started = Instant::now();
+    let options = &stoppable(options, progress);
+    if let Some(checkpoint) = sink.resume().map_err(ChainError::Sink)? {
+        banks::check(code, &plan.steps, options)?;
+        return Runner::resume(code, plan, options, progress, sink, chain, checkpoint)?.run();
+    }
+    let (how, from) = shared.get(|| start_of(code, plan, options))?;
+    // Under a time limit a quarter of it is for the start, as much as that leaves to warm-up.
+    let how = Start { within: options.time.map(|t| t / 4), ..how };
+    banks::check(code, &plan.steps, options)?;
+    let mut begun =
+        starts_from(code, (options.seed, chain), how, from.as_ref(), options.limits.clone())
+            .map_err(ChainError::Start)?;
+    for trace in &mut begun {
+        super::force::apply(code, trace, (options.seed, chain))?;
+    }
+    run_among(code, plan, options, progress, sink, (chain, started), begun)
+}
+
+/// Runs a plan from a given state, in place of a start from the prior; `force` statements
+/// of the program are not applied again. Streams of random numbers are determined by
+/// seed, chain and step: two runs from one state need different chain numbers.
+///
+/// # Errors
+/// If the program or the sink fails.
+pub fn run_from(
+    code: &Arc<Code>,
+    plan: &Plan,
+    options: &RunOptions,
+    progress: &Progress,
+    sink: &mut dyn Sink,
+    chain: u32,
+    mut trace: Trace,
+) -> Result<ChainResult, ChainError> {
+    let started = Instant::now();
+    let options = &stoppable(options, progress);
+    banks::check(code, &plan.steps, options)?;
+    trace.rollback();
+    trace.set_limits(options.limits.clone());
+    run_among(code, plan, options, progress, sink, (chain, started), vec![trace])
+}
+
+/// The options of a chain, with limits by which it can also be stopped in the middle of
+/// an evaluation.
+fn stoppable(options: &RunOptions, progress: &Progress) -> RunOptions {
+    let stop =
+        options.limits.stop.clone().or(Arc::clone(&progress.cancelled)).or_within(options.time);
+    RunOptions { limits: Limits { stop, ..options.limits.clone() }, ..options.clone() }
+}
+
+/// Runs a plan from the best of several states.
+fn run_among(
+    code: &Arc<Code>,
+    plan: &Plan,
+    options: &RunOptions,
+    progress: &Progress,
+    sink: &mut dyn Sink,
+    (chain, started): (u32, Instant),
+    mut begun: Vec<Trace>,
+) -> Result<ChainResult, ChainError> {
+    let population = Population::new(&begun);
+    let trace = begun.swap_remove(0);
+    let mut runner =
+        Runner::new(code, plan, options, progress, sink, (chain, started), (trace, population));
+    progress.started.fetch_add(1, Ordering::Relaxed);
+    let done = runner.freeze().and_then(|()| runner.run());
+    progress.ended.fetch_add(1, Ordering::Relaxed);
+    done
+}

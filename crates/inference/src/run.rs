@@ -1,0 +1,136 @@
+//! What a run of chains is given, and what it gives: settings, progress, results, errors.
+
+use super::callback::Callback;
+use super::init::StartError;
+use super::neighbours::Banks;
+use super::pause::Pause;
+use super::state::StateError;
+use super::stats::{KernelStats, SiteStats};
+use pcadlang_engine::lang::error::RunError;
+use pcadlang_engine::trace::{Constraint, Limits, Trace};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
+use std::time::Duration;
+
+/// Bounds and settings of a run.
+#[derive(Clone, Debug)]
+pub struct RunOptions {
+    /// The seed; the same seed gives the same draws.
+    pub seed: u64,
+    /// Kernel applications per chain after warm-up, in place of the outermost `repeat`'s
+    /// count.
+    pub steps: Option<u64>,
+    /// Kernel applications per chain in warm-up, in place of the program's count.
+    pub warmup: Option<u64>,
+    /// The time limit of the whole run, which ends at the next step. At most half of it
+    /// goes to warm-up.
+    pub time: Option<Duration>,
+    /// If false, every update re-runs the whole program.
+    pub incremental: bool,
+    /// Limits on what the program may build.
+    pub limits: Limits,
+    /// Called at steps and draws.
+    pub callback: Option<Arc<dyn Callback>>,
+    /// Finds the neighbours that `knn` proposes from.
+    pub banks: Option<Arc<dyn Banks>>,
+    /// Whether to count the proposals of single-site kernels by address; this costs a few
+    /// percent of a fast step.
+    pub sites: bool,
+    /// Whether to record the log density of each observed value with every draw, as the
+    /// column `log_lik`, if there are at most 1000 of them.
+    pub pointwise: bool,
+    /// The number of the first chain. Chains with the same seed and number have the same
+    /// draws, so that the chains of a run can be spread over several calls or machines.
+    pub first_chain: u32,
+}
+
+impl Default for RunOptions {
+    fn default() -> Self {
+        RunOptions {
+            seed: 0,
+            steps: None,
+            warmup: None,
+            time: None,
+            incremental: true,
+            limits: Limits::default(),
+            callback: None,
+            banks: None,
+            sites: false,
+            pointwise: false,
+            first_chain: 0,
+        }
+    }
+}
+
+/// State shared between the chains and the code that monitors them.
+#[derive(Debug, Default)]
+pub struct Progress {
+    /// Set it to end the run at the next step, or after a while in the middle of one.
+    pub cancelled: Arc<AtomicBool>,
+    /// Increment it to make every chain pass a [`Checkpoint`](super::Checkpoint) to its sink at the next
+    /// step. A chain that ends before its plan does passes one in any case.
+    pub checkpoints: AtomicU64,
+    /// Steps of all chains.
+    pub steps: AtomicU64,
+    /// The best log joint density of any chain, as bits of an `f64`.
+    pub best: AtomicU64,
+    /// Chains that have an initial state.
+    pub started: AtomicU32,
+    /// Chains that are in warm-up.
+    pub warming: AtomicU32,
+    /// Chains that have ended.
+    pub ended: AtomicU32,
+    /// The pass of an outermost loop that a chain began last, and the number of passes of
+    /// that loop.
+    pub pass: AtomicU64,
+    /// See `pass`.
+    pub passes: AtomicU64,
+    /// Holds the chains between two kernel applications.
+    pub pause: Pause,
+}
+
+/// The result of a chain.
+#[derive(Debug)]
+pub struct ChainResult {
+    /// The last state.
+    pub last: Trace,
+    /// The choices of the best recorded draw, with its log joint density.
+    pub best: Option<(f64, Vec<(u64, Constraint)>)>,
+    /// Kernel applications after warm-up, and in it.
+    pub steps: u64,
+    /// See `steps`.
+    pub warmup: u64,
+    /// The number of draws recorded.
+    pub draws: u64,
+    /// What the kernels did.
+    pub kernels: Vec<KernelStats>,
+    /// What single-site kernels did, by address, if [`RunOptions::sites`] is set.
+    pub sites: Vec<SiteStats>,
+    /// Wall time.
+    pub seconds: f64,
+}
+
+/// Why a chain ended early.
+#[derive(Debug)]
+pub enum ChainError {
+    /// The chain could not start.
+    Start(StartError),
+    /// The program failed.
+    Run(Box<RunError>),
+    /// The draws could not be written.
+    Sink(std::io::Error),
+    /// The chain cannot resume from the checkpoint.
+    Checkpoint(StateError),
+}
+
+impl From<StateError> for ChainError {
+    fn from(e: StateError) -> Self {
+        ChainError::Checkpoint(e)
+    }
+}
+
+impl From<Box<RunError>> for ChainError {
+    fn from(e: Box<RunError>) -> Self {
+        ChainError::Run(e)
+    }
+}

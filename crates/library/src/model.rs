@@ -1,0 +1,270 @@
+//! Embedding: a program compiled with its data, run to a posterior, in a few calls.
+//!
+//! ```
+//! use pcadlang::{Model, RunOptions};
+//! let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;")?;
+//! let posterior = model.run(&RunOptions { steps: Some(2000), ..RunOptions::default() }, 2, 2)?;
+//! let x = &posterior.quantity("x").unwrap().summary;
+//! assert!((x.mean - 1.6).abs() < 0.2);
+//! # Ok::<(), pcadlang::Error>(())
+//! ```
+
+mod camera;
+mod edited;
+mod hosted;
+mod program;
+
+pub use pcadlang_syntax::diag::Error;
+pub use program::Program;
+
+use pcadlang_engine::lang::code::Code;
+use pcadlang_engine::lang::error::RunError;
+use pcadlang_engine::lang::lower::{Compiled, Export, Report, compile_plan};
+use pcadlang_engine::lang::plan::Plan;
+use pcadlang_engine::lang::reach::Reach;
+use pcadlang_engine::trace::{Draws, Limits, Trace};
+use pcadlang_inference::draws::Sink;
+use pcadlang_inference::{
+    ChainError, ChainResult, Progress, RunOptions, attempts, default_plan, run_chains,
+};
+use pcadlang_numerics::platform::clock;
+use pcadlang_numerics::rng::{Purpose, StreamKey};
+use pcadlang_report::{ChainDraws, Memory, Quantity, quantities};
+use pcadlang_syntax::ast::ItemKind;
+use pcadlang_syntax::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap};
+use pcadlang_syntax::parse;
+use std::sync::Arc;
+
+/// The number of draws from the prior from which a default plan is made.
+const DRAWS_FOR_PLAN: u64 = 10;
+/// The number of draws that are tried if all of those fail.
+const ATTEMPTS_FOR_PLAN: u64 = 1000;
+
+/// A compiled program with its data.
+#[derive(Debug)]
+pub struct Model {
+    compiled: Compiled,
+    sources: SourceMap,
+    text: String,
+    hash: String,
+    data_hash: String,
+    reach: Reach,
+    limits: Limits,
+}
+
+impl Model {
+    /// Compiles a program from its text, with default parameters and data.
+    ///
+    /// # Errors
+    /// All errors in the program.
+    pub fn from_text(text: &str) -> Result<Model, Error> {
+        Program::parse(text)?.compile()
+    }
+
+    /// Returns the lowered program, for work on [traces](pcadlang_engine::trace).
+    pub fn code(&self) -> &Arc<Code> {
+        &self.compiled.code
+    }
+
+    /// Returns a hash of the program's text and settings.
+    pub fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// Returns a hash of the files that the program itself reads: the defaults of its
+    /// `data` items.
+    pub fn data_hash(&self) -> &str {
+        &self.data_hash
+    }
+
+    /// Returns the text of the main file.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Returns the folders that the program may read while it runs.
+    #[doc(hidden)]
+    pub fn reach(&self) -> &Reach {
+        &self.reach
+    }
+
+    /// Returns the limits for evaluations outside of runs.
+    #[doc(hidden)]
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Returns the source texts that errors refer to.
+    pub fn sources(&self) -> &SourceMap {
+        &self.sources
+    }
+
+    /// Returns the program's exports.
+    #[doc(hidden)]
+    pub fn exports(&self) -> &[Export] {
+        &self.compiled.exports
+    }
+
+    /// Returns the program's reports.
+    #[doc(hidden)]
+    pub fn reports(&self) -> &[Report] {
+        &self.compiled.reports
+    }
+
+    /// Draws once from the prior; observations are scored, but do not condition the draw.
+    ///
+    /// # Errors
+    /// If the program fails.
+    pub fn simulate(&self, seed: u64, index: u64) -> Result<Trace, Error> {
+        let draws =
+            Draws { key: StreamKey::new(seed, 0, Purpose::START), step: index, substream: 0 };
+        Trace::simulate(Arc::clone(self.code()), draws, self.limits.clone())
+            .map_err(|e| self.run_error(*e))
+    }
+
+    /// Converts a failure at run time to diagnostics.
+    pub fn run_error(&self, e: RunError) -> Error {
+        Error { diagnostics: vec![e.into_diagnostic()], sources: self.sources.clone() }
+    }
+
+    /// Converts the failure of a chain to diagnostics.
+    pub fn chain_error(&self, e: ChainError) -> Error {
+        use pcadlang_inference::StartError;
+        let plain = |message: String| Diagnostic::new(Severity::Error, message);
+        let d = match e {
+            ChainError::Run(e) | ChainError::Start(StartError::Run(e)) => e.into_diagnostic(),
+            ChainError::Start(StartError::Impossible(zero)) => {
+                let mut d = plain(format!("cannot start any chain: {zero}"));
+                for (i, term) in zero.terms.iter().take(5).enumerate() {
+                    let why =
+                        term.outside.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
+                    d = match i {
+                        0 => d.primary(
+                            term.span,
+                            format!("the log density of {} is -inf{why}", term.address),
+                        ),
+                        _ => d.secondary(term.span, format!("so is that of {}{why}", term.address)),
+                    };
+                }
+                if zero.terms.len() > 5 {
+                    d = d.note(format!("and {} more", zero.terms.len() - 5));
+                }
+                if !zero.drawn.is_empty() {
+                    let drawn: Vec<String> =
+                        zero.drawn.iter().map(|(a, v)| format!("{a} = {v}")).collect();
+                    d = d.note(format!("in the last draw, {}", drawn.join(", ")));
+                }
+                d.hint(match zero.terms.first().is_some_and(|t| t.outside.is_some()) {
+                    true => "check the data, or observe them under a distribution whose support contains them",
+                    false => "use a wider prior or a wider likelihood; a factor of -inf excludes a state",
+                })
+            }
+            ChainError::Sink(e) => plain(format!("cannot write draws: {e}")),
+            ChainError::Checkpoint(e) => plain(format!("cannot resume a chain: {e}")),
+        };
+        Error { diagnostics: vec![d], sources: self.sources.clone() }
+    }
+
+    /// Returns the inference plan: the program's first `infer` block, or the default
+    /// plan. The second part is the text of the default plan, if that is used.
+    ///
+    /// # Errors
+    /// If no draw from the prior succeeds, so that the program's choices are unknown.
+    #[doc(hidden)]
+    pub fn plan(&self) -> Result<(Arc<Plan>, Option<String>), Error> {
+        if let Some(p) = self.compiled.plans.first() {
+            return Ok((Arc::clone(p), None));
+        }
+        let drawn = |i| {
+            let draws = Draws { key: StreamKey::new(0, 0, Purpose::START), step: i, substream: 0 };
+            Trace::simulate(Arc::clone(self.code()), draws, self.limits.clone())
+        };
+        let mut draws: Vec<Trace> = (0..DRAWS_FOR_PLAN).filter_map(|i| drawn(i).ok()).collect();
+        if draws.is_empty() {
+            // Draws may fail, e.g. because a standard deviation is negative; the plan is
+            // then made from the first draw that succeeds.
+            draws.push(attempts(ATTEMPTS_FOR_PLAN, drawn).map_err(|e| self.run_error(*e))?);
+        }
+        let text = default_plan(&mut draws);
+        let mut sources = self.sources.clone();
+        let file = sources.add("<default plan>", &text);
+        let (program, _) = parse(&text, file);
+        let body = program.items.into_iter().find_map(|i| match i.kind {
+            ItemKind::Infer { body, .. } => Some(body),
+            _ => None,
+        });
+        let plan = compile_plan(Arc::clone(&self.code().builtins), &body.unwrap_or_default());
+        Ok((Arc::new(plan), Some(text)))
+    }
+
+    /// Runs chains and keeps their draws in memory. The draws depend on the seed, but not
+    /// on the number of threads.
+    ///
+    /// # Errors
+    /// If a chain cannot start or the program fails.
+    pub fn run(
+        &self,
+        options: &RunOptions,
+        chains: usize,
+        threads: usize,
+    ) -> Result<Posterior, Error> {
+        let memories: Vec<Memory> = (0..chains.max(1)).map(|_| Memory::default()).collect();
+        let sinks = memories.iter().map(|m| Box::new(m.clone()) as Box<dyn Sink>).collect();
+        let results = self.run_into(options, threads, &Progress::default(), sinks)?;
+        let results =
+            results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| self.chain_error(e))?;
+        Ok(Posterior { draws: memories.iter().map(Memory::draws).collect(), chains: results })
+    }
+
+    /// Runs one chain per sink. A chain that fails does not stop the others.
+    ///
+    /// # Errors
+    /// As [`Model::plan`], and if there is a time limit but the platform has no clock.
+    pub fn run_into(
+        &self,
+        options: &RunOptions,
+        threads: usize,
+        progress: &Progress,
+        sinks: Vec<Box<dyn Sink>>,
+    ) -> Result<Vec<Result<ChainResult, ChainError>>, Error> {
+        if options.time.is_some() && !clock::RUNS {
+            let d = Diagnostic::new(
+                Severity::Error,
+                "this platform has no clock, so a run cannot have a time limit",
+            );
+            return Err(Error {
+                diagnostics: vec![d.hint("limit it by `steps`")],
+                sources: self.sources.clone(),
+            });
+        }
+        let (plan, _) = self.plan()?;
+        Ok(run_chains(self.code(), &plan, options, threads, progress, sinks))
+    }
+}
+
+/// Draws from a posterior, and the chains that made them.
+#[derive(Debug)]
+pub struct Posterior {
+    /// The draws of each chain.
+    pub draws: Vec<ChainDraws>,
+    /// The last state of each chain, its kernels and its statistics.
+    pub chains: Vec<ChainResult>,
+}
+
+impl Posterior {
+    /// Returns every scalar quantity with its summary; elements of vectors are named
+    /// `name[i]`.
+    pub fn quantities(&self) -> Vec<Quantity> {
+        quantities(&self.draws)
+    }
+
+    /// Returns the quantity with this name.
+    pub fn quantity(&self, name: &str) -> Option<Quantity> {
+        self.quantities().into_iter().find(|q| q.name == name)
+    }
+
+    /// Returns the draws of every scalar quantity, with those of all chains concatenated.
+    pub fn scalars(&self) -> Vec<(String, Vec<f64>)> {
+        self.quantities().into_iter().map(|q| (q.name, q.chains.concat())).collect()
+    }
+}

@@ -1,0 +1,172 @@
+//! Candidate objects of revolution in a photograph, as values: a thin layer over
+//! [`pcadlang_scene::vision::candidates`].
+
+use super::observed::MaskValue;
+use super::{CAMERA, CameraValue, IMAGE, ImageValue, native};
+use glam::DVec3;
+use pcadlang_engine::lang::builtins::{Row, Type, arg, opt};
+use pcadlang_engine::lang::error::{Fault, FaultKind};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_scene::render::{Camera, Projection};
+use pcadlang_scene::vision::candidates::{
+    Axis, Candidate, CandidateOptions, candidates, enclosed, tilts,
+};
+use std::sync::Arc;
+
+pub(super) const TABLE: &[Row] = &[native(
+    "candidates",
+    "Finding",
+    &[
+        arg(
+            "photo",
+            IMAGE,
+            "The photograph; from a contour map alone, the enclosed regions are used.",
+        ),
+        opt("most", Type::Int, "20", "The maximum number of candidates, 1 to 64."),
+        opt(
+            "size",
+            Type::Int,
+            "128",
+            "The longer side of the picture that is analysed, 32 to 512; 256 for a contour map.",
+        )
+        .unit("pixels"),
+        opt("camera", CAMERA, "the run's", "The camera; by default, that of the run."),
+    ],
+    Type::Array,
+    "Regions of a photograph that may be objects of revolution, the most probable first. Each is \
+     a record: `score`; `mask`; `axes`, one or two records, the more symmetric first: `symmetry`, \
+     0 to 1; the ends `foot` and `top`, in a fronto-parallel plane at about the distance of the \
+     origin; their distance `length`; the unit vectors `along`, from foot to top, and `toward` \
+     the camera, which is at `distance`; `widths`, 24 half-widths from foot to top; `tilts`, 80 \
+     angles by which the axis may be turned towards the camera, radians, and `rims`, the evidence \
+     for each of them, 0 to 1: whether a flat end would appear as an ellipse of that height. \
+     Lengths are in scene units. Depends only on the picture and the camera, and is computed \
+     once.",
+    |a| {
+        if matches!(a.values.first(), Some(Value::Unit)) {
+            return Ok(Value::List(Arc::from([])));
+        }
+        let image = a.object::<ImageValue>(0, "an image")?;
+        let (width, height) = image.size();
+        let most = if a.given(1) {
+            a.int_in(1, 1, 64)? as usize
+        } else {
+            CandidateOptions::default().most
+        };
+        let usual = if image.as_photo().is_some() { CandidateOptions::default().size } else { 256 };
+        let size = if a.given(2) { a.int_in(2, 32, 512)? as u32 } else { usual };
+        let camera = match a.given(3) {
+            true => a.object::<CameraValue>(3, "a camera")?.0,
+            false => Camera::default_for(width, height),
+        };
+        let options = CandidateOptions { most, size };
+        let found = image.candidates.get(options, |o| match image.as_photo() {
+            Some(photo) => Ok(candidates(photo, o)),
+            None => Ok(enclosed(image.map()?, o)),
+        });
+        let found = found
+            .map_err(|e: String| Fault::new(FaultKind::Other, format!("scene.candidates: {e}")))?;
+        let scale = [
+            f64::from(camera.width) / f64::from(width.max(1)),
+            f64::from(camera.height) / f64::from(height.max(1)),
+        ];
+        Ok(Value::List(found.iter().map(|c| value(c, &camera, scale)).collect()))
+    },
+)];
+
+/// Converts a candidate to a record; `scale` is the size of a photograph's pixel in
+/// pixels of the camera.
+fn value(c: &Candidate, camera: &Camera, scale: [f64; 2]) -> Value {
+    let axes = c.axes.iter().map(|a| axis(a, camera, scale)).collect();
+    Value::record([
+        ("score", Value::Num(c.score)),
+        ("mask", Value::object(MaskValue::new(c.mask.clone()))),
+        ("axes", Value::List(axes)),
+    ])
+}
+
+fn axis(a: &Axis, camera: &Camera, scale: [f64; 2]) -> Value {
+    // The midpoint of the axis is placed at the depth of the origin; the axis lies in the
+    // plane through it that faces the camera.
+    let depth = (-camera.eye).dot(camera.forward).max(Camera::NEAR);
+    let at = |[x, y]: [f64; 2], depth| camera.unproject(x * scale[0], y * scale[1], depth);
+    let middle = at([0.5 * (a.foot[0] + a.top[0]), 0.5 * (a.foot[1] + a.top[1])], depth);
+    let (toward, distance) = match camera.projection {
+        Projection::Pinhole { .. } => {
+            ((camera.eye - middle).normalize_or(-camera.forward), camera.eye.distance(middle))
+        }
+        Projection::Orthographic { .. } => (-camera.forward, f64::INFINITY),
+    };
+    let there = |pixel: [f64; 2]| {
+        let (near, far) = (at(pixel, 0.0), at(pixel, depth));
+        let ray = far - near;
+        near + ray * ((middle - near).dot(toward) / ray.dot(toward))
+    };
+    let (foot, top) = (there(a.foot), there(a.top));
+    let [dx, dy] = [a.top[0] - a.foot[0], a.top[1] - a.foot[1]];
+    let pixels = f64::hypot(dx, dy).max(1e-9);
+    let last = a.widths.len() as f64;
+    let width = |(i, w): (usize, &f64)| {
+        let (t, across) = ((i as f64 + 0.5) / last, [-dy / pixels * w, dx / pixels * w]);
+        let side = |s: f64| {
+            there([a.foot[0] + t * dx + s * across[0], a.foot[1] + t * dy + s * across[1]])
+        };
+        0.5 * side(1.0).distance(side(-1.0))
+    };
+    let vector = |v: DVec3| Value::array(v.to_array().to_vec());
+    Value::record([
+        ("symmetry", Value::Num(a.symmetry)),
+        ("foot", vector(foot)),
+        ("top", vector(top)),
+        ("length", Value::Num(foot.distance(top))),
+        ("along", vector((top - foot).normalize_or(camera.up))),
+        ("toward", vector(toward)),
+        ("distance", Value::Num(distance)),
+        ("widths", Value::array(a.widths.iter().enumerate().map(width).collect::<Vec<_>>())),
+        ("tilts", Value::array(tilts().collect::<Vec<_>>())),
+        ("rims", Value::array(a.rims.clone())),
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A disc that faces the camera, far from the centre of the picture, is as long as it
+    /// is wide in every direction.
+    #[test]
+    fn lengths_are_those_of_a_plane_that_faces_the_eye() {
+        let camera = Camera::default_for(256, 256);
+        let (middle, radius) = (DVec3::new(1.7, -1.4, 0.0), 0.3);
+        let toward = (camera.eye - middle).normalize();
+        let across = toward.cross(DVec3::Y).normalize();
+        for i in 0..6 {
+            let angle = f64::from(i) * 0.5;
+            let along = libm::cos(angle) * across + libm::sin(angle) * toward.cross(across);
+            let pixel = |by: f64| {
+                let (x, y, _) = camera.project(middle + by * radius * along);
+                [x, y]
+            };
+            let (foot, top) = (pixel(-1.0), pixel(1.0));
+            let (x, y, _) = camera.project(middle + radius * toward.cross(along));
+            let [ux, uy] = [top[0] - foot[0], top[1] - foot[1]];
+            let (mx, my) = (0.5 * (foot[0] + top[0]), 0.5 * (foot[1] + top[1]));
+            let width = ((x - mx) * uy - (y - my) * ux).abs() / f64::hypot(ux, uy);
+            let seen = Axis { symmetry: 1.0, foot, top, widths: vec![width], rims: Vec::new() };
+            let made = axis(&seen, &camera, [1.0, 1.0]);
+            let Value::Record(fields) = &made else { panic!("no record") };
+            let number = |name: &str| match fields.get(name) {
+                Some(Value::Num(x)) => *x,
+                Some(Value::Array(xs)) => xs[0],
+                _ => panic!("{name}"),
+            };
+            assert!(
+                (number("length") / (2.0 * radius) - 1.0).abs() < 0.004,
+                "{i}: {}",
+                number("length")
+            );
+            assert!((number("widths") / radius - 1.0).abs() < 0.012, "{i}: {}", number("widths"));
+            assert!((number("distance") - camera.eye.distance(middle)).abs() < 0.02);
+        }
+    }
+}

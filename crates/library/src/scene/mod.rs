@@ -1,0 +1,106 @@
+//! The module `scene`: shapes, placements, cameras, and the likelihoods that compare a
+//! view with an observation.
+//!
+//! The scene is a guest of the engine: it registers everything through [`pcadlang_inference::host`], as
+//! any embedding program does. It is a thin layer: [`pcadlang_scene::geom`], [`pcadlang_scene::render`] and
+//! [`pcadlang_scene::vision`] do the work; here their values become values of the language.
+
+mod adjoints;
+mod bodies;
+mod candidates;
+mod compare;
+mod compare_depths;
+mod compare_keypoints;
+pub mod data;
+mod edges;
+mod examples;
+#[cfg(test)]
+mod gradient_tests;
+mod inputs;
+
+mod objects;
+mod observed;
+mod people;
+mod region;
+mod scene_view;
+mod seeing;
+mod shapes;
+mod shared_tally;
+
+pub use inputs::{CAMERAS, DETECTOR_DEFAULT};
+pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};
+pub use observed::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue};
+pub use scene_view::SceneView;
+
+pub use pcadlang_engine::lang::builtins::{Arg, Args, Resume, Row, Type, function};
+use pcadlang_engine::lang::error::{Fault, FaultKind};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_inference::host::{Entry, Host};
+use pcadlang_scene::geom::GeomError;
+use std::sync::Arc;
+
+const SOLID: Type = Type::Object("a solid");
+const ARMATURE: Type = Type::Object("an armature");
+const AFFINE: Type = Type::Object("a placement");
+const CAMERA: Type = Type::Object("a camera");
+const VIEW: Type = Type::Object("a view");
+const IMAGE: Type = Type::Object("an image");
+const DETECTOR: Type = Type::Object("a detector");
+
+/// A pure function of this module.
+const fn native(
+    name: &'static str,
+    section: &'static str,
+    args: &'static [Arg],
+    returns: Type,
+    doc: &'static str,
+    f: fn(&Args) -> Result<Value, Fault>,
+) -> Row {
+    Row { module: "scene", ..function(name, section, args, returns, doc, f) }
+}
+
+/// A function of this module that may start from its previous evaluation.
+const fn incremental(
+    name: &'static str,
+    section: &'static str,
+    args: &'static [Arg],
+    returns: Type,
+    doc: &'static str,
+    f: Resume,
+) -> Row {
+    Row { module: "scene", ..Row::incremental(name, section, args, returns, doc, f) }
+}
+
+/// The scene as a host: its functions, its kinds of data, and how it prepares inputs.
+pub fn host() -> Host {
+    let tables = [
+        data::TABLE,
+        shapes::TABLE,
+        bodies::TABLE,
+        seeing::TABLE,
+        compare::TABLE,
+        region::TABLE,
+        edges::TABLE,
+        people::TABLE,
+        candidates::TABLE,
+        compare_keypoints::TABLE,
+        compare_depths::TABLE,
+    ];
+    let host = Host::new().hook(Arc::new(inputs::Inputs));
+    tables.into_iter().flatten().fold(host, |host, row| {
+        let entry = Entry::from(row);
+        host.with(match examples::of(row) {
+            Some(text) => entry.example(text),
+            None => entry,
+        })
+    })
+}
+
+/// Converts the error of a shape that cannot be made: numbers outside their domain reject
+/// a proposal, anything else ends the run.
+fn fault(e: GeomError) -> Fault {
+    match e {
+        GeomError::Domain(m) => Fault::domain(m),
+        GeomError::Invalid(m) => Fault::new(FaultKind::Other, m),
+    }
+}

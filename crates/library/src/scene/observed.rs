@@ -1,0 +1,389 @@
+//! Observations: photographs and ready-made contour maps, masks, depth maps, keypoints.
+//! Data that comparators derive from an observation alone are computed on first use and
+//! cached with it.
+
+use pcadlang_detectors::people::Person;
+use pcadlang_engine::lang::value::{Object, Value};
+use pcadlang_scene::vision::candidates::{Candidate, CandidateOptions};
+use pcadlang_scene::vision::{
+    Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood,
+    DepthMap, FileDetector, GradientDetector, Keypoints, Mask, MaskLikelihood, Photo, Region,
+    RegionOptions, SoftMap,
+};
+use std::any::Any;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// The maximum number of cached items of a kind: options can be choices of the program,
+/// such as the `sigma` of a chamfer distance.
+const MOST: usize = 32;
+
+/// A cache of prepared data, by their options.
+#[derive(Debug)]
+pub(super) struct Cache<K, T>(Mutex<Vec<(K, Arc<T>)>>);
+
+impl<K, T> Default for Cache<K, T> {
+    fn default() -> Self {
+        Cache(Mutex::default())
+    }
+}
+
+impl<K: PartialEq, T> Cache<K, T> {
+    /// Returns the item for a key; makes it if it is new.
+    pub fn get(
+        &self,
+        key: K,
+        make: impl FnOnce(&K) -> Result<T, String>,
+    ) -> Result<Arc<T>, String> {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, t)) = all.iter().find(|(k, _)| *k == key) {
+            return Ok(Arc::clone(t));
+        }
+        let made = Arc::new(make(&key)?);
+        if all.len() == MOST {
+            // Keeps the first item, which may be a simulated observation that cannot be
+            // remade.
+            all.remove(1);
+        }
+        all.push((key, Arc::clone(&made)));
+        Ok(made)
+    }
+
+    /// Returns the item that was made first.
+    pub fn any(&self) -> Option<Arc<T>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).first().map(|(_, t)| Arc::clone(t))
+    }
+}
+
+/// Options, and the width and height of the frame.
+type Key<O> = (O, u32, u32);
+
+/// A photograph, a ready-made contour map, or both.
+#[derive(Debug, Default)]
+pub struct ImageValue {
+    photo: Option<Photo>,
+    /// Its contours, given or detected on first use.
+    map: OnceLock<Result<ContourMap, String>>,
+    /// Whether the contours were given.
+    ready: bool,
+    /// The detector to use where the program does not choose one.
+    by: OnceLock<DetectorValue>,
+    pub(super) ratios: Cache<Key<ContourRatioOptions>, ContourRatio>,
+    pub(super) chamfers: Cache<Key<ChamferOptions>, Chamfer>,
+    pub(super) regions: Cache<Key<RegionOptions>, Region>,
+    /// The same photograph with contours detected by other settings: the detector and the
+    /// minimum strength.
+    detected: Cache<(DetectorSettings, f32), Value>,
+    /// Maps from detectors that were read from files, by detector and size.
+    soft: Cache<(DetectorValue, u32), SoftMap>,
+    /// Candidate objects, by the options of the search.
+    pub(super) candidates: Cache<CandidateOptions, Vec<Candidate>>,
+    /// The people in the photograph, by the options of the search: the number of views,
+    /// and the maximum number of people.
+    pub(super) people: Cache<(u32, u32), Vec<(Person, Value)>>,
+}
+
+impl ImageValue {
+    /// The minimum strength of a contour point: weaker ones are more often texture than
+    /// outline. The detector's own best threshold against human outlines is 0.47, and a
+    /// few more edges help where the object is dim
+    /// (docs/measurements/earlier_objects.md).
+    pub(super) const STRONG: f32 = 0.4;
+
+    /// Creates an image of a photograph; its contours are detected when they are needed.
+    pub fn photo(photo: Photo) -> Self {
+        ImageValue { photo: Some(photo), ..ImageValue::default() }
+    }
+
+    /// Creates an image of a ready-made contour map, and its photograph if available.
+    pub fn contours(map: ContourMap, photo: Option<Photo>) -> Self {
+        ImageValue { photo, map: OnceLock::from(Ok(map)), ready: true, ..ImageValue::default() }
+    }
+
+    /// Returns the photograph.
+    pub fn as_photo(&self) -> Option<&Photo> {
+        self.photo.as_ref()
+    }
+
+    /// Returns the people that programs detected in it, most prominent first; `None` if
+    /// no program did.
+    pub fn people(&self) -> Option<Vec<Person>> {
+        self.people.any().map(|all| all.iter().map(|(p, _)| p.clone()).collect())
+    }
+
+    /// Returns its contours, detecting them if necessary.
+    ///
+    /// # Errors
+    /// If the detector chosen for it fails.
+    pub fn map(&self) -> Result<&ContourMap, String> {
+        let found = self.map.get_or_init(|| match &self.photo {
+            Some(photo) => {
+                let (by, least) = DetectorSettings::usual(self.by.get());
+                self.found(photo, &by).map(|map| strong(map, least))
+            }
+            None => Ok(ContourMap::default()),
+        });
+        found.as_ref().map_err(String::clone)
+    }
+
+    /// Returns the contours that programs have used; `None` if they have used none.
+    pub fn seen(&self) -> Option<ContourMap> {
+        let otherwise = self.detected.any();
+        let image = otherwise.as_ref().and_then(|v| v.downcast::<ImageValue>()).unwrap_or(self);
+        image.map.get()?.as_ref().ok().cloned()
+    }
+
+    /// Returns the image with `by` as the detector where the program does not choose one;
+    /// given contours stay.
+    pub fn detecting(image: &Value, by: &DetectorValue) -> Value {
+        match image.downcast::<ImageValue>() {
+            Some(ImageValue { photo: Some(photo), ready: false, map, by: known, .. }) => {
+                // Contours already detected belong to the detector chosen at that time.
+                if map.get().is_none() {
+                    let _ = known.set(by.clone());
+                }
+                if known.get() == Some(by) {
+                    return image.clone();
+                }
+                Value::object(ImageValue {
+                    by: OnceLock::from(by.clone()),
+                    ..ImageValue::photo(photo.clone())
+                })
+            }
+            _ => image.clone(),
+        }
+    }
+
+    /// Returns the same photograph with the contours of a given detector that have at
+    /// least strength `least`; `None` if there is no photograph.
+    pub(super) fn detected_by(
+        &self,
+        by: DetectorSettings,
+        least: f32,
+    ) -> Result<Option<Value>, String> {
+        let Some(photo) = &self.photo else { return Ok(None) };
+        let found = self.detected.get((by, least), |(by, least)| {
+            let map = strong(self.found(photo, by)?, *least);
+            Ok(Value::object(ImageValue::contours(map, Some(photo.clone()))))
+        })?;
+        Ok(Some(Value::clone(&found)))
+    }
+
+    fn found(&self, photo: &Photo, by: &DetectorSettings) -> Result<ContourMap, String> {
+        match by {
+            DetectorSettings::Gradients(detector) => Ok(detector.contours(photo)),
+            DetectorSettings::File { detector, size, sigma } => {
+                let Some(file) = &detector.0 else { return Err("the detector has no file".into()) };
+                let soft = self.soft.get((detector.clone(), *size), |_| {
+                    file.map(photo, *size).map_err(|e| e.to_string())
+                })?;
+                Ok(file.contours(&soft, photo, *sigma))
+            }
+        }
+    }
+
+    /// Returns the width and height in pixels.
+    pub fn size(&self) -> (u32, u32) {
+        match &self.photo {
+            Some(p) => (p.width(), p.height()),
+            None => self.map().map_or((0, 0), |m| (m.width, m.height)),
+        }
+    }
+}
+
+/// A contour detector from a file, or the built-in one if there is no file. Clones share
+/// it.
+#[derive(Clone, Debug, Default)]
+pub struct DetectorValue(pub Option<Arc<FileDetector>>);
+
+impl PartialEq for DetectorValue {
+    /// Whether both come from the same reading of a file, which may have changed in
+    /// between.
+    fn eq(&self, other: &Self) -> bool {
+        match (&self.0, &other.0) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (a, b) => a.is_none() && b.is_none(),
+        }
+    }
+}
+
+impl Object for DetectorValue {
+    fn type_name(&self) -> &'static str {
+        "a detector"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}
+
+/// A detector with its settings.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum DetectorSettings {
+    /// The built-in detector.
+    Gradients(GradientDetector),
+    /// A detector from a file.
+    File {
+        /// The detector.
+        detector: DetectorValue,
+        /// The longer side of the picture that is analysed, in pixels.
+        size: u32,
+        /// The standard deviation of the smoothing, in pixels.
+        sigma: f32,
+    },
+}
+
+impl DetectorSettings {
+    /// Returns a detector with its default settings, and the minimum strength of its
+    /// contours.
+    pub fn usual(detector: Option<&DetectorValue>) -> (DetectorSettings, f32) {
+        match detector.and_then(|d| d.0.as_ref().map(|file| (d, file))) {
+            Some((d, file)) => {
+                let (detector, size, sigma) = (d.clone(), FileDetector::SIZE, file.sigma());
+                (DetectorSettings::File { detector, size, sigma }, file.strength())
+            }
+            None => (DetectorSettings::Gradients(GradientDetector::default()), ImageValue::STRONG),
+        }
+    }
+}
+
+/// Returns the points of at least a given strength, which count as edges.
+fn strong(map: ContourMap, least: f32) -> ContourMap {
+    let mut kept = ContourMap::new(map.width, map.height);
+    for i in (0..map.len()).filter(|i| map.strength[*i] >= least) {
+        kept.x.push(map.x[i]);
+        kept.y.push(map.y[i]);
+        kept.tx.push(map.tx[i]);
+        kept.ty.push(map.ty[i]);
+        kept.strength.push(map.strength[i]);
+    }
+    kept
+}
+
+impl Object for ImageValue {
+    fn type_name(&self) -> &'static str {
+        "an image"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    fn field(&self, name: &str) -> Option<Value> {
+        match name {
+            "width" => Some(Value::Num(f64::from(self.size().0))),
+            "height" => Some(Value::Num(f64::from(self.size().1))),
+            _ => None,
+        }
+    }
+
+    fn summary(&self) -> Option<String> {
+        let (w, h) = self.size();
+        Some(format!("{w} x {h} pixels"))
+    }
+}
+
+/// An observed mask.
+#[derive(Debug)]
+pub struct MaskValue {
+    /// The mask.
+    pub mask: Mask,
+    pub(super) prepared: Cache<Key<[f64; 2]>, MaskLikelihood>,
+}
+
+impl MaskValue {
+    /// Creates an observed mask.
+    pub fn new(mask: Mask) -> Self {
+        MaskValue { mask, prepared: Cache::default() }
+    }
+}
+
+impl Object for MaskValue {
+    fn type_name(&self) -> &'static str {
+        "a mask"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    fn numbers(&self) -> Option<Vec<f64>> {
+        Some(self.mask.data().iter().map(|m| f64::from(u8::from(*m))).collect())
+    }
+}
+
+/// An observed depth map.
+#[derive(Debug)]
+pub struct DepthValue {
+    /// The depth map.
+    pub depth: DepthMap,
+    pub(super) prepared: Cache<Key<[f64; 4]>, DepthLikelihood>,
+}
+
+impl DepthValue {
+    /// Creates an observed depth map.
+    pub fn new(depth: DepthMap) -> Self {
+        DepthValue { depth, prepared: Cache::default() }
+    }
+}
+
+impl Object for DepthValue {
+    fn type_name(&self) -> &'static str {
+        "a depth map"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    /// The depths; background is infinite.
+    fn numbers(&self) -> Option<Vec<f64>> {
+        Some(self.depth.data().iter().map(|d| f64::from(*d)).collect())
+    }
+}
+
+/// The joints of a person from a pose detector; empty without a detection.
+#[derive(Clone, Debug, Default)]
+pub struct KeypointsValue(pub Keypoints);
+
+impl Object for KeypointsValue {
+    fn type_name(&self) -> &'static str {
+        "keypoints"
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    fn field(&self, name: &str) -> Option<Value> {
+        (name == "count").then(|| Value::Num(self.0.points().len() as f64))
+    }
+
+    fn summary(&self) -> Option<String> {
+        Some(format!("{} joints", self.0.points().len()))
+    }
+
+    /// The x and y of each joint.
+    fn numbers(&self) -> Option<Vec<f64>> {
+        Some(self.0.points().iter().flat_map(|p| [p.x, p.y]).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_that_move_do_not_fill_the_memory() {
+        let prepared: Cache<u32, u32> = Cache::default();
+        prepared.get(0, |_| Ok(7)).unwrap();
+        let first = Arc::downgrade(&prepared.get(1, |_| Ok(2)).unwrap());
+        for key in 0..1000 {
+            assert_eq!(
+                *prepared.get(key, |k| Ok(k + 1)).unwrap(),
+                if key == 0 { 7 } else { key + 1 }
+            );
+        }
+        assert_eq!(prepared.0.lock().unwrap().len(), MOST);
+        assert!(first.upgrade().is_none() && *prepared.get(0, |_| Ok(8)).unwrap() == 7);
+    }
+}

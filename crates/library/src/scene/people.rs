@@ -1,0 +1,128 @@
+//! The people in a photograph, as values: a thin layer over [`pcadlang_detectors::people`].
+
+use super::observed::{KeypointsValue, MaskValue};
+use super::{IMAGE, ImageValue, native};
+use pcadlang_detectors::people::{FindOptions, Person, networks};
+use pcadlang_engine::lang::builtins::{Row, Type, arg, opt};
+use pcadlang_engine::lang::error::{Fault, FaultKind};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_scene::vision::keypoints::{Alternative, Keypoint, Keypoints, MEDIAPIPE};
+use pcadlang_scene::vision::{Mask, Photo};
+use std::sync::Arc;
+
+/// The maximum length of the longer side of a person's mask, in pixels.
+const MASK: u32 = 256;
+/// The weight of an alternative pose relative to that on which most views agree, if
+/// equally many views support both; proportional to the number of its views.
+const ELSEWHERE: f64 = 0.05;
+
+pub(super) const TABLE: &[Row] = &[native(
+    "people",
+    "Finding",
+    &[
+        arg("photo", IMAGE, "The photograph; people cannot be detected in a contour map."),
+        opt(
+            "views",
+            Type::Int,
+            "2",
+            "The number of views, 2 to 8: with increasing padding, each also mirrored.",
+        ),
+        opt("most", Type::Int, "2", "The maximum number of people per view, 1 to 100."),
+        opt(
+            "near",
+            Type::Array,
+            "[]",
+            "A box [x, y, width, height]: people who fill it best come first.",
+        )
+        .unit("pixels"),
+    ],
+    Type::Array,
+    "The people in a photograph, the most prominent first. Each is a record: `keypoints`, 33 \
+     joints, with alternative positions where views disagree; `landmarks`, by name `at`, `spread` \
+     over agreeing views and `visibility`; `metres`, by name [right, down, away] from the \
+     mid-hip; `mask`; `box`, [x, y, width, height] around all joints, and `torso`, in pixels; \
+     `score`; `sure`, the confidence from 0 to 1 that this is a person; `views`, the number of \
+     views in which the person was found, and `agreeing`, how many of them agree. Depends only on \
+     the picture, and is computed once.",
+    |a| {
+        let image = a.object::<ImageValue>(0, "an image")?;
+        let Some(photo) = image.as_photo() else { return Ok(Value::List(Arc::from([]))) };
+        let views = if a.given(1) { a.int_in(1, 2, 8)? as u32 } else { 2 };
+        let most = if a.given(2) { a.int_in(2, 1, 100)? as u32 } else { 2 };
+        let near: Arc<[f64]> = if a.given(3) { a.array(3)? } else { Arc::from([]) };
+        if !near.is_empty() && near.len() != 4 {
+            return Err(a.wrong_length(3, "4 numbers"));
+        }
+        let found = image.people.get((views, most), |_| {
+            let options = FindOptions { views, most: most as usize, ..FindOptions::default() };
+            let finder = networks::finder()?;
+            let found = finder.find(photo, &options, 0).map_err(|e| e.to_string())?;
+            found.into_iter().map(|p| Ok((p.clone(), value(&p, photo)?))).collect()
+        });
+        let found = found
+            .map_err(|e: String| Fault::new(FaultKind::Other, format!("scene.people: {e}")))?;
+        let mut order: Vec<usize> = (0..found.len()).collect();
+        if let [x, y, w, h] = near[..] {
+            let wanted = [x, y, x + w, y + h];
+            let overlap: Vec<f64> = found.iter().map(|(p, _)| shared(p.bounds, wanted)).collect();
+            order.sort_by(|i, j| overlap[*j].total_cmp(&overlap[*i]));
+        }
+        Ok(Value::List(order.into_iter().map(|i| found[i].1.clone()).collect()))
+    },
+)];
+
+/// The intersection of two boxes as a fraction of their union.
+fn shared(a: [f64; 4], b: [f64; 4]) -> f64 {
+    let area = |[l, t, r, b]: [f64; 4]| (r - l).max(0.0) * (b - t).max(0.0);
+    let both = area([a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])]);
+    both / (area(a) + area(b) - both).max(1e-9)
+}
+
+fn number(x: f64) -> Value {
+    Value::Num(x)
+}
+
+/// Converts a person to a record.
+fn value(p: &Person, photo: &Photo) -> Result<Value, String> {
+    let point =
+        |(i, (name, l)): (usize, (&&'static str, &pcadlang_detectors::people::Landmark))| {
+            let elsewhere = p.others.iter().map(|h| {
+                let [x, y] = h.landmarks[i].at;
+                Alternative { x, y, weight: ELSEWHERE * h.views as f64 / p.agreeing.max(1) as f64 }
+            });
+            let one = Keypoint::new(*name, l.at, l.visibility.clamp(0.0, 1.0));
+            Keypoint { others: elsewhere.collect(), ..one }
+        };
+    let named = || MEDIAPIPE.iter().zip(&p.landmarks);
+    let keypoints =
+        Keypoints::new(named().enumerate().map(point).collect()).map_err(|e| e.to_string())?;
+    let keypoints = keypoints.in_image(photo.width(), photo.height());
+    let landmarks = named().map(|(name, l)| {
+        let fields = [
+            ("at", Value::array(l.at.to_vec())),
+            ("spread", number(l.spread)),
+            ("visibility", number(l.visibility)),
+        ];
+        (*name, Value::record(fields))
+    });
+    let metres = named().map(|(name, l)| (*name, Value::array(l.metres.to_vec())));
+    let longer = photo.width().max(photo.height()).max(1);
+    let side =
+        |s: u32| (u64::from(s) * u64::from(MASK.min(longer)) / u64::from(longer)).max(1) as u32;
+    let (width, height) = (side(photo.width()), side(photo.height()));
+    let pixels = p.mask(width, height, photo.width()).into_iter().map(|m| m > 0.5).collect();
+    let mask = Mask::new(width, height, pixels).map_err(|e| e.to_string())?;
+    let [left, top, right, bottom] = p.bounds;
+    Ok(Value::record([
+        ("keypoints", Value::object(KeypointsValue(keypoints))),
+        ("landmarks", Value::record(landmarks)),
+        ("metres", Value::record(metres)),
+        ("mask", Value::object(MaskValue::new(mask))),
+        ("box", Value::array(vec![left, top, right - left, bottom - top])),
+        ("torso", number(p.torso)),
+        ("score", number(p.score)),
+        ("sure", number(p.sure)),
+        ("views", number(p.views as f64)),
+        ("agreeing", number(p.agreeing as f64)),
+    ]))
+}

@@ -1,0 +1,166 @@
+//! Cameras and views.
+
+use super::shapes::vector;
+use super::{CAMERA, CameraValue, SOLID, SolidValue, VIEW, ViewValue, incremental, native};
+use glam::DVec3;
+use pcadlang_engine::lang::adjoint::Adjoint;
+use pcadlang_engine::lang::builtins::{Row, Type, arg, opt};
+use pcadlang_engine::lang::error::Fault;
+use pcadlang_engine::lang::value::Value;
+use pcadlang_scene::render::{Camera, Projection, View};
+use smallvec::smallvec;
+use std::sync::Arc;
+
+const SECTION: &str = "Seeing";
+
+/// The maximum tolerated error of contours, in pixels.
+const MOST_DETAIL: f64 = 16.0;
+
+pub(super) const TABLE: &[Row] = &[
+    native(
+        "camera",
+        SECTION,
+        &[
+            opt("position", Type::Array, "[0, 0, 8]", "The position of the camera.")
+                .unit("scene units"),
+            opt(
+                "look_at",
+                Type::Array,
+                "[0, 0, 0]",
+                "The point it looks at, at the centre of the picture.",
+            )
+            .unit("scene units"),
+            opt("up", Type::Array, "[0, 1, 0]", "The direction that points up in the picture."),
+            opt(
+                "focal",
+                Type::Num,
+                "1.818",
+                "The focal length as a multiple of the picture's longer side.",
+            ),
+            opt("width", Type::Int, "256", "The width of the picture.").unit("pixels"),
+            opt("height", Type::Int, "256", "The height of the picture.").unit("pixels"),
+        ],
+        CAMERA,
+        "A pinhole camera. By default a view uses the camera of the run: `--camera`, or the default view.",
+        |a| {
+            let eye = vector(a, 0, DVec3::new(0.0, 0.0, 8.0))?;
+            let target = vector(a, 1, DVec3::ZERO)?;
+            let up = vector(a, 2, DVec3::Y)?;
+            let focal = a.positive_or(3, 8.0 / 4.4)?;
+            let side = |i: usize| if a.given(i) { a.int_in(i, 1, 16384) } else { Ok(256) };
+            let (width, height) = (side(4)? as u32, side(5)? as u32);
+            let forward = (target - eye).try_normalize();
+            let right = forward.and_then(|f| f.cross(up).try_normalize());
+            let (Some(forward), Some(right)) = (forward, right) else {
+                return Err(Fault::domain(
+                    "scene.camera: the viewing direction must not be zero or parallel to `up`",
+                ));
+            };
+            let projection = Projection::Pinhole {
+                focal_px: focal * f64::from(width.max(height)),
+                cx: f64::from(width) / 2.0,
+                cy: f64::from(height) / 2.0,
+            };
+            let up = right.cross(forward);
+            Ok(Value::object(CameraValue(Camera {
+                eye,
+                right,
+                up,
+                forward,
+                width,
+                height,
+                projection,
+            })))
+        },
+    ),
+    incremental(
+        "render",
+        SECTION,
+        &[
+            arg("solid", SOLID, "The solid to view."),
+            opt("camera", CAMERA, "the run's", "The camera; by default, that of the run."),
+            opt(
+                "detail",
+                Type::Num,
+                "0",
+                "Level of detail: the tolerated error of contours and silhouettes, so that meshes \
+                 can be simplified as far as their size in the picture allows; 0 draws the full \
+                 meshes.",
+            )
+            .unit("pixels"),
+        ],
+        VIEW,
+        "A solid seen by a camera. It is rendered only when a likelihood or report needs it.",
+        |a, previous| {
+            let solid = a.object::<SolidValue>(0, "a solid")?;
+            let camera = match a.given(1) {
+                true => a.object::<CameraValue>(1, "a camera")?.0,
+                false => Camera::default_for(256, 256),
+            };
+            let detail = a.num_or(2, 0.0)?;
+            if !(0.0..=MOST_DETAIL).contains(&detail) {
+                let message = format!(
+                    "scene.render: `detail` must be from 0 to {MOST_DETAIL} pixels, got {detail}"
+                );
+                return Err(Fault::domain(message));
+            }
+            let view = View::with_detail(solid.0.clone(), camera, detail);
+            let view = match previous.and_then(|p| p.value.downcast::<ViewValue>()) {
+                Some(previous) => view.after(&previous.0),
+                None => view,
+            };
+            // The view holds all that the next one needs.
+            Ok((Value::object(ViewValue(Arc::new(view))), Arc::new(())))
+        },
+    )
+    .vjp(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown, Adjoint::Unknown])),
+    native(
+        "bounds",
+        SECTION,
+        &[arg("view", VIEW, "The view.")],
+        Type::Array,
+        "The bounding box of a solid in the picture: left, top, right and bottom of all its \
+         vertices, as fractions of the picture's sides, so that values below 0 or above 1 are \
+         outside the picture. Infinite if it extends behind the camera, or has no vertices.",
+        |a| {
+            let view = a.object::<ViewValue>(0, "a view")?;
+            let b = view.0.image_bounds();
+            Ok(Value::array(b.to_vec()))
+        },
+    ),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use pcadlang_scene::geom::Affine;
+
+    fn bounds(at: DVec3) -> Vec<f64> {
+        let cube = pcadlang_scene::geom::cuboid(DVec3::splat(1.0))
+            .map(|m| pcadlang_scene::geom::Solid::new(Arc::new(m)))
+            .unwrap();
+        let solid = cube.placed(Affine::new(at, DVec3::ZERO, DVec3::ONE));
+        let view = Value::object(ViewValue(Arc::new(View::with_detail(
+            solid,
+            Camera::default_for(256, 256),
+            0.0,
+        ))));
+        let table = crate::standard::table();
+        let builtin = table.get(table.find("scene", "bounds").unwrap());
+        builtin.apply(&[&view]).unwrap().numbers()
+    }
+
+    #[test]
+    fn bounds_of_a_cube() {
+        // Half a unit at depth 7.5 is 8 / 4.4 * 0.5 / 7.5 of the picture.
+        let half = 8.0 / 4.4 * 0.5 / 7.5;
+        let b = bounds(DVec3::ZERO);
+        for (b, expected) in b.iter().zip([0.5 - half, 0.5 - half, 0.5 + half, 0.5 + half]) {
+            assert!((b - expected).abs() < 1e-9, "{b} {expected}");
+        }
+        let out = bounds(DVec3::new(4.0, 0.0, 0.0));
+        assert!(out[0] > 1.0 && out[2] > out[0], "{out:?}");
+        assert_eq!(bounds(DVec3::new(0.0, 0.0, 8.0))[2], f64::INFINITY);
+    }
+}

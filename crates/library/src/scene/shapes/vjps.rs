@@ -1,0 +1,143 @@
+//! Vector-Jacobian products of shapes and placements: from the vertices of surfaces and
+//! landmarks to sizes and profiles.
+
+use super::args::{LatheArgs, lathe_args, vector};
+use crate::scene::SolidValue;
+use crate::scene::adjoints::{BySolid, shaped};
+use glam::{DMat3, DVec3};
+use pcadlang_engine::lang::adjoint::Adjoint;
+use pcadlang_engine::lang::builtins::{ArgAdjoints, Args};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_scene::geom::{Mesh, Profile, Solid, vjp_cuboid, vjp_lathe, vjp_sphere};
+use smallvec::smallvec;
+use std::sync::Arc;
+
+/// Returns a shape's mesh and the derivatives with respect to its vertices; `None` if
+/// nothing depends on them.
+fn surface<'a>(made: &'a Value, by: &Adjoint) -> Option<(&'a Mesh, Vec<DVec3>)> {
+    let solid = &made.downcast::<SolidValue>()?.0;
+    let vertices = BySolid::read(by, solid).vertices;
+    (!vertices.is_empty()).then_some((&solid.instances().first()?.mesh, vertices))
+}
+
+/// For `scene.lathe`.
+pub(super) fn lathe(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
+    let Some((_, by_vertex)) = surface(made, by) else { return Some(ArgAdjoints::new()) };
+    let LatheArgs { profiles, sides, wall, caps, .. } = lathe_args(a).ok()?;
+    let g = vjp_lathe(&profiles, sides, wall, caps, &by_vertex).ok()?;
+    let parts = match a.get(0) {
+        Value::List(all) => {
+            Adjoint::List(all.iter().zip(&g.profiles).map(|(v, g)| profile(v, g)).collect())
+        }
+        one => g.profiles.first().map_or(Adjoint::Zero, |g| profile(one, g)),
+    };
+    let [thickness, floor] = [g.wall.thickness, g.wall.floor].map(Adjoint::Num);
+    Some(smallvec![parts, Adjoint::Zero, thickness, Adjoint::Zero, floor])
+}
+
+/// Converts to the shape of a profile's record.
+fn profile(v: &Value, by: &Profile) -> Adjoint {
+    let Value::Record(fields) = v else { return Adjoint::Zero };
+    let one = |(name, v): (&Arc<str>, &Value)| {
+        let all = if **name == *"y" { &by.y } else { &by.r };
+        let by = match v {
+            // One radius for all heights.
+            Value::Num(_) => Adjoint::Num(all.iter().sum()),
+            Value::Array(xs) if xs.len() < all.len() => Adjoint::Array(vec![all.iter().sum()]),
+            _ => Adjoint::Array(all.clone()),
+        };
+        (Arc::clone(name), by)
+    };
+    Adjoint::Record(
+        fields.iter().filter(|(name, _)| matches!(&***name, "y" | "r")).map(one).collect(),
+    )
+}
+
+/// For `scene.sphere`.
+pub(super) fn sphere(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
+    let Some((mesh, by_vertex)) = surface(made, by) else { return Some(ArgAdjoints::new()) };
+    Some(smallvec![Adjoint::Num(vjp_sphere(a.num(0).ok()?, mesh, &by_vertex))])
+}
+
+/// For `scene.box`.
+pub(super) fn cuboid(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
+    let Some((mesh, by_vertex)) = surface(made, by) else { return Some(ArgAdjoints::new()) };
+    let by_size = vjp_cuboid(vector(a, 0, DVec3::ONE).ok()?, mesh, &by_vertex);
+    Some(smallvec![shaped(a.get(0), by_size)])
+}
+
+/// For `scene.group`: landmarks and vertices are concatenated in the order of the
+/// members.
+pub(super) fn group(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
+    let BySolid { landmarks, vertices } = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
+    let (mut landmarks, mut vertices) = (&landmarks[..], &vertices[..]);
+    let next = |rest: &mut &[DVec3], n: usize| {
+        let (own, after) = rest.split_at(n.min(rest.len()));
+        *rest = after;
+        own.to_vec()
+    };
+    let one = |i: usize| {
+        let member = a.get(0).element(i)?;
+        let solid = &member.downcast::<SolidValue>()?.0;
+        let own = BySolid {
+            landmarks: next(&mut landmarks, solid.landmarks().len()),
+            vertices: if vertices.is_empty() {
+                Vec::new()
+            } else {
+                next(&mut vertices, solid.vertex_count())
+            },
+        };
+        Some(own.into_adjoint())
+    };
+    Some(smallvec![Adjoint::List((0..a.get(0).len()?).map(one).collect::<Option<_>>()?)])
+}
+
+/// For `scene.centred`: the bounding box moves with the vertices on its sides.
+pub(super) fn centred(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
+    let by = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
+    let solid: &Solid = &a.object::<SolidValue>(0, "a solid").ok()?.0;
+    let (vertices, landmarks) =
+        solid.vjp_centred(a.bool_or(1, false).ok()?, &by.vertices, &by.landmarks);
+    Some(smallvec![BySolid { landmarks, vertices }.into_adjoint()])
+}
+
+/// For `scene.landmarks`.
+pub(super) fn landmarks(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
+    let BySolid { landmarks, vertices } = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
+    let own = a.record(1).ok()?.keys().zip(landmarks);
+    let by_points =
+        own.map(|(name, g)| (Arc::clone(name), Adjoint::Array(g.to_array().to_vec()))).collect();
+    Some(smallvec![
+        BySolid { vertices, ..BySolid::default() }.into_adjoint(),
+        Adjoint::Record(by_points)
+    ])
+}
+
+/// For `scene.affine`, T Rz Ry Rx S.
+pub(super) fn affine(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
+    let (turn, scale) = (vector(a, 1, DVec3::ZERO).ok()?, vector(a, 2, DVec3::ONE).ok()?);
+    let by = by.numbers(12);
+    let (linear, shift) = (DMat3::from_cols_slice(&by[..9]), DVec3::from_slice(&by[9..]));
+    let turns = [
+        DMat3::from_rotation_x(turn.x),
+        DMat3::from_rotation_y(turn.y),
+        DMat3::from_rotation_z(turn.z),
+    ];
+    let rotation = turns[2] * turns[1] * turns[0];
+    let by_scale: [f64; 3] = std::array::from_fn(|i| rotation.col(i).dot(linear.col(i)));
+    // With respect to R: the columns of the linear part are those of R times the scale.
+    let by_rotation =
+        DMat3::from_cols(linear.x_axis * scale.x, linear.y_axis * scale.y, linear.z_axis * scale.z);
+    let by_turn: [f64; 3] = std::array::from_fn(|i| {
+        // d R_i(angle) / d angle = [axis]x R_i.
+        let axis = DVec3::AXES[i];
+        let cross =
+            DMat3::from_cols(axis.cross(DVec3::X), axis.cross(DVec3::Y), axis.cross(DVec3::Z));
+        let mut moved = turns;
+        moved[i] = cross * turns[i];
+        let slope = moved[2] * moved[1] * moved[0];
+        (0..3).map(|k| slope.col(k).dot(by_rotation.col(k))).sum()
+    });
+    let like = |i: usize, g: DVec3| shaped(a.get(i), g);
+    Some(smallvec![like(0, shift), like(1, by_turn.into()), like(2, by_scale.into())])
+}

@@ -1,0 +1,151 @@
+//! Brings the chains of a run that has ended to the same columns and the same number of
+//! draws, as ArviZ and CmdStan's tools require.
+//!
+//! A chain's file grows while it runs; under a time limit some chains get further than
+//! others, and columns are added when the structure of a scene changes. A file that has
+//! to be changed is kept in its original form as `draws-N.csv` beside `chain-N.csv`, so
+//! that the chain can resume from it.
+//!
+//! Invariant: whenever the process stops, one of the two files holds all draws of the
+//! chain.
+
+use super::atomic_write::begin;
+use super::csv::{Contents, CsvError, CsvSink, DrawReader};
+use pcadlang_inference::draws::{Column, DrawRow, Sink, merged};
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, Write};
+use std::path::Path;
+
+/// Returns the name of the file of a chain's draws; chains are counted from 0.
+pub(super) fn draws_name(chain: u32) -> String {
+    format!("chain-{}.csv", u64::from(chain) + 1)
+}
+
+/// Returns the name of the file that keeps all draws of a chain, if its main file was
+/// changed.
+pub(super) fn all_name(chain: u32) -> String {
+    format!("draws-{}.csv", u64::from(chain) + 1)
+}
+
+/// Brings the files of `chains` chains to the same columns and, if `even`, to the same
+/// number of draws: that of the shortest chain with any draws. Returns that number if
+/// draws were left out.
+///
+/// # Errors
+/// Returns an error if a file cannot be read or written.
+pub fn align(dir: &Path, chains: u32, even: bool) -> io::Result<Option<u64>> {
+    let found =
+        (0..chains).map(|c| look(&dir.join(draws_name(c)))).collect::<io::Result<Vec<_>>>()?;
+    let counts = || found.iter().map(|f| f.draws).filter(|n| *n > 0);
+    let (fewest, most) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
+    let keep = if even { fewest } else { most };
+    let columns = found.iter().fold(Vec::new(), |all, f| merged(&all, &f.columns));
+    for (chain, f) in (0..chains).zip(&found).filter(|(_, f)| f.draws > 0) {
+        if f.draws > keep || f.heads != 1 || f.columns != columns {
+            rewrite(dir, chain, f, &columns, keep)?;
+        }
+    }
+    Ok((keep < most).then_some(keep))
+}
+
+/// Restores all draws of a chain's file, if some were set aside.
+///
+/// # Errors
+/// Returns an error if the file cannot be renamed.
+pub(super) fn restore(dir: &Path, chain: u32) -> io::Result<()> {
+    match std::fs::rename(dir.join(all_name(chain)), dir.join(draws_name(chain))) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(e),
+        _ => Ok(()),
+    }
+}
+
+/// Reads the comments, the columns and the number of draws of a chain's file.
+///
+/// # Errors
+/// Returns an error if it cannot be read.
+pub(super) fn look(path: &Path) -> io::Result<Contents> {
+    Contents::of(BufReader::new(File::open(path)?)).map_err(CsvError::into_io)
+}
+
+/// Rewrites a chain's file with its first draws in the given columns, and keeps the old
+/// file.
+fn rewrite(
+    dir: &Path,
+    chain: u32,
+    found: &Contents,
+    columns: &[Column],
+    keep: u64,
+) -> io::Result<()> {
+    let path = dir.join(draws_name(chain));
+    let mut reader = DrawReader::new(BufReader::new(File::open(&path)?), columns, u64::MAX);
+    let new = begin(dir, &draws_name(chain), |file| {
+        let mut out = BufWriter::new(file);
+        out.write_all(found.comments.as_bytes())?;
+        let mut sink = CsvSink::bare(out);
+        sink.columns(columns)?;
+        for draw in 0..keep.min(found.draws) {
+            let Some(row) = reader.next_row().map_err(CsvError::into_io)? else { break };
+            sink.draw(&DrawRow { chain, draw, ..row })?;
+        }
+        sink.flush()
+    })?;
+    std::fs::rename(&path, dir.join(all_name(chain)))?;
+    new.end()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::csv::read;
+    use super::*;
+    use std::path::PathBuf;
+
+    const NAMES: &str = "lp__,accept_stat__,divergent__,log_prior__,log_likelihood__,step__";
+
+    fn folder(name: &str) -> PathBuf {
+        let dir =
+            std::env::temp_dir().join(format!("pcadlang-aligned-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&dir);
+        std::fs::create_dir_all(&dir).unwrap();
+        dir
+    }
+
+    #[test]
+    fn chains_come_to_one_form_and_back() {
+        let dir = folder("form");
+        let one = format!(
+            "# id = 1\n{NAMES},k,w.1\n-1,1,0,0,-1,1,1,0.1\n{NAMES},k,w.1,w.2\n-2,1,0,0,-2,2,2,0.1,0.2\n# steps = 2\n"
+        );
+        let two = format!(
+            "# id = 2\n{NAMES},k,w.1,e\n-1,1,0,0,-1,1,1,0.3,7\n-1,1,0,0,-1,2,1,0.3,8\n-1,1,0,0,-1,3,1,0.4,9\n"
+        );
+        std::fs::write(dir.join("chain-1.csv"), &one).unwrap();
+        std::fs::write(dir.join("chain-2.csv"), &two).unwrap();
+        // A chain that was stopped before it began.
+        std::fs::write(dir.join("chain-3.csv"), "# id = 3\n").unwrap();
+        assert_eq!(align(&dir, 3, true).unwrap(), Some(2));
+        let chain = |name: &str| read(&std::fs::read_to_string(dir.join(name)).unwrap()).unwrap();
+        let (a, b) = (chain("chain-1.csv"), chain("chain-2.csv"));
+        assert_eq!(a.columns, b.columns);
+        assert_eq!((a.rows.len(), b.rows.len()), (2, 2));
+        assert!(
+            a.rows[0].values[..2] == [1.0, 0.1] && a.rows[0].values[2..].iter().all(|x| x.is_nan())
+        );
+        assert!(
+            b.rows[1].values[..2] == [1.0, 0.3]
+                && b.rows[1].values[2].is_nan()
+                && b.rows[1].values[3] == 8.0
+        );
+        assert!(a.comments.contains(&("steps".into(), "2".into())));
+        // All draws are still there, and are restored.
+        assert_eq!(chain("draws-2.csv").rows.len(), 3);
+        assert_eq!(align(&dir, 3, true).unwrap(), None, "nothing is left to do");
+        (0..3).for_each(|c| restore(&dir, c).unwrap());
+        assert_eq!(std::fs::read_to_string(dir.join("chain-1.csv")).unwrap(), one);
+        assert_eq!(std::fs::read_to_string(dir.join("chain-2.csv")).unwrap(), two);
+        assert!(!dir.join("draws-1.csv").exists());
+        // No draws of an interrupted run are left out.
+        assert_eq!(align(&dir, 3, false).unwrap(), None);
+        assert_eq!((chain("chain-1.csv").rows.len(), chain("chain-2.csv").rows.len()), (2, 3));
+        std::fs::remove_dir_all(&dir).unwrap();
+    }
+}

@@ -1,0 +1,212 @@
+//! The draws of a chain in memory, and the scalar quantities in them.
+
+use pcadlang_inference::diagnostics::{Summary, summary};
+use pcadlang_inference::draws::{Column, DrawRow, Layout, POINTWISE, Shape, merged, width};
+use std::borrow::Cow;
+
+/// The draws of one chain.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChainDraws {
+    /// Key-value pairs about the chain (settings, counts), as in the file of draws.
+    pub comments: Vec<(String, String)>,
+    /// The recorded quantities.
+    pub columns: Vec<Column>,
+    /// The draws, in order.
+    pub rows: Vec<DrawRow>,
+    /// One of every `every` draws is kept: 1, unless there was not enough room for all.
+    pub every: u64,
+}
+
+impl Default for ChainDraws {
+    fn default() -> Self {
+        ChainDraws { comments: Vec::new(), columns: Vec::new(), rows: Vec::new(), every: 1 }
+    }
+}
+
+impl Quantity {
+    /// Returns the reason why R-hat is undefined; `None` if it is defined.
+    ///
+    /// ```
+    /// let model = pcadlang::Model::from_text("assume x ~ normal(0, 1); infer { repeat 100 { collect x; } }")?;
+    /// let posterior = model.run(&pcadlang::RunOptions::default(), 2, 1)?;
+    /// let why = posterior.quantity("x").and_then(|q| q.why_no_r_hat());
+    /// assert_eq!(why, Some("it never moved in any chain, and the chains have different values"));
+    /// # Ok::<(), pcadlang::Error>(())
+    /// ```
+    pub fn why_no_r_hat(&self) -> Option<&'static str> {
+        if !self.summary.r_hat.is_nan() {
+            return None;
+        }
+        let draws = || self.chains.iter().flatten();
+        Some(match () {
+            () if self.chains.len() < 2 => "a single chain",
+            () if self.chains.iter().any(|c| c.len() < 4) => "fewer than 4 draws per chain",
+            () if draws().any(|x| x.is_nan()) => "it is missing from some draws",
+            () if !draws().all(|x| x.is_finite()) => "it is infinite in some draws",
+            () if self.is_stuck() => {
+                "it never moved in any chain, and the chains have different values"
+            }
+            () => "it never moved",
+        })
+    }
+
+    /// Returns whether each chain is constant, but not all of them at the same value.
+    #[doc(hidden)]
+    pub fn is_stuck(&self) -> bool {
+        let same = |xs: &[f64]| xs.windows(2).all(|w| w[0].to_bits() == w[1].to_bits());
+        let firsts: Vec<f64> = self.chains.iter().filter_map(|c| c.first().copied()).collect();
+        self.chains.iter().all(|c| same(c)) && !same(&firsts)
+    }
+}
+
+impl ChainDraws {
+    /// Converts the draws to other columns, which must include the current ones.
+    #[doc(hidden)]
+    pub fn widen(&mut self, columns: Vec<Column>) {
+        let layout = Layout::new(&self.columns, &columns);
+        if !layout.is_same(width(&self.columns)) {
+            self.rows.iter_mut().for_each(|r| r.values = layout.apply(&r.values));
+        }
+        self.columns = columns;
+    }
+}
+
+/// Converts all chains to the union of their columns, with NaN where a draw has no value.
+pub fn widen(chains: &mut [ChainDraws]) {
+    let Some(all) = common(chains) else { return };
+    chains.iter_mut().filter(|c| !c.rows.is_empty()).for_each(|c| c.widen(all.clone()));
+}
+
+/// Returns the union of the columns of all chains, if they are not all the same.
+fn common(chains: &[ChainDraws]) -> Option<Vec<Column>> {
+    let mut each = chains.iter().map(|c| &c.columns).filter(|c| !c.is_empty());
+    let first = each.next()?;
+    let others: Vec<_> = each.filter(|c| *c != first).collect();
+    (!others.is_empty()).then(|| others.into_iter().fold(first.clone(), |all, c| merged(&all, c)))
+}
+
+/// One number per draw, over all chains.
+#[derive(Clone, Debug)]
+pub struct Quantity {
+    /// Its name: that of the column, with `[i]` (counted from 0, as in the language) for
+    /// an element of a vector.
+    pub name: String,
+    /// The column it belongs to; `None` for the log joint density.
+    pub column: Option<usize>,
+    /// The draws, `[chain][draw]`.
+    pub chains: Vec<Vec<f64>>,
+    /// The summary of the draws.
+    pub summary: Summary,
+}
+
+/// Returns every scalar quantity of the chains with its summary, starting with the log
+/// joint density (`log_joint`). The columns are the union of those of all chains, with
+/// NaN where a draw has no value. A column that repeats the log joint density is left
+/// out, and so are the log densities of single observed values.
+pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
+    let mut chains = Cow::Borrowed(chains);
+    if common(&chains).is_some() {
+        widen(chains.to_mut());
+    }
+    let chains = &chains[..];
+    let quantity = |name: String, column, value: &dyn Fn(&DrawRow) -> Option<f64>| {
+        let series: Vec<Vec<f64>> =
+            chains.iter().map(|c| c.rows.iter().filter_map(value).collect()).collect();
+        Quantity { name, column, summary: summary(&series), chains: series }
+    };
+    let mut out = vec![quantity("log_joint".into(), None, &|r| Some(r.log_joint))];
+    let columns = chains.iter().map(|c| &c.columns[..]).find(|c| !c.is_empty()).unwrap_or_default();
+    let mut at = 0;
+    for (index, column) in columns.iter().enumerate() {
+        if column.name == POINTWISE {
+            // One column per observed value, for model comparison (`az.loo`); these are
+            // not posterior quantities.
+            at += column.shape.len();
+            continue;
+        }
+        if column.name == out[0].name && column.shape == Shape::Scalar && repeats(chains, at) {
+            at += 1;
+            continue;
+        }
+        for i in 0..column.shape.len() {
+            let name = match column.shape {
+                Shape::Scalar => column.name.clone(),
+                Shape::Vector(_) => format!("{}[{i}]", column.name),
+            };
+            out.push(quantity(name, Some(index), &|r| r.values.get(at).copied()));
+            at += 1;
+        }
+    }
+    out
+}
+
+/// Returns whether the numbers at index `at` of all rows are the log joint density.
+fn repeats(chains: &[ChainDraws], at: usize) -> bool {
+    let mut rows = chains.iter().flat_map(|c| &c.rows);
+    rows.all(|r| r.values.get(at).is_some_and(|x| x.to_bits() == r.log_joint.to_bits()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_log_joint_density_is_there_once() {
+        let row = |x: f64, said: f64| DrawRow {
+            chain: 0,
+            draw: 0,
+            step: 0,
+            log_joint: x,
+            log_prior: 0.0,
+            log_likelihood: 0.0,
+            values: vec![said, 7.0],
+            ..DrawRow::default()
+        };
+        let chain = |rows| ChainDraws {
+            columns: vec![Column::scalar("log_joint"), Column::scalar("b")],
+            rows,
+            ..Default::default()
+        };
+        let names = |c: ChainDraws| {
+            quantities(&[c]).into_iter().map(|q| (q.name, q.chains)).collect::<Vec<_>>()
+        };
+        let one = names(chain(vec![row(1.0, 1.0), row(2.0, 2.0)]));
+        assert_eq!(
+            one,
+            [("log_joint".into(), vec![vec![1.0, 2.0]]), ("b".into(), vec![vec![7.0, 7.0]])]
+        );
+        assert_eq!(
+            names(chain(vec![row(1.0, 1.0), row(2.0, 3.0)])).len(),
+            3,
+            "another thing of that name stays"
+        );
+    }
+
+    #[test]
+    fn vectors_become_elements() {
+        let row = |draw, x: f64| DrawRow {
+            chain: 0,
+            draw,
+            step: draw,
+            log_joint: -x,
+            log_prior: 0.0,
+            log_likelihood: 0.0,
+            values: vec![x, 2.0 * x, 3.0 * x],
+            ..DrawRow::default()
+        };
+        let chain = |shift: f64| ChainDraws {
+            columns: vec![Column::scalar("a"), Column::vector("v", 2)],
+            rows: (0..4).map(|d| row(d, d as f64 + shift)).collect(),
+            ..Default::default()
+        };
+        let q = quantities(&[chain(0.0), chain(1.0)]);
+        assert_eq!(
+            q.iter().map(|q| &*q.name).collect::<Vec<_>>(),
+            ["log_joint", "a", "v[0]", "v[1]"]
+        );
+        assert_eq!(q[3].chains, [[0.0, 3.0, 6.0, 9.0], [3.0, 6.0, 9.0, 12.0]]);
+        assert_eq!(q[1].summary.mean, 2.0);
+        assert_eq!((q[0].column, q[3].column), (None, Some(1)));
+        assert_eq!(quantities(&[])[0].chains.len(), 0);
+    }
+}

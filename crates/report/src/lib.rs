@@ -1,0 +1,57 @@
+//! The output of a run: draws as CmdStan CSV, a run directory, pictures, tables, and a
+//! page that shows all of it.
+//!
+//! This module neither prints nor makes decisions; it turns results into text and files.
+//! It depends on draws, diagnostics, meshes and drawn pictures, but not on programs or
+//! traces.
+
+mod aligned;
+mod atomic_write;
+mod chain_file;
+pub mod checkpoint;
+pub mod csv;
+mod draws;
+pub mod embedded;
+pub mod evaluation;
+pub mod film;
+mod hash;
+pub mod html;
+#[doc(hidden)]
+pub mod inference;
+mod modes;
+mod moments;
+mod number;
+pub mod pictures;
+mod reread;
+mod rundir;
+mod sinks;
+#[doc(hidden)]
+pub mod svg;
+pub mod table;
+mod warnings;
+pub mod zarr;
+
+#[doc(hidden)]
+pub use aligned::align;
+#[doc(hidden)]
+pub use atomic_write::write_file;
+#[doc(hidden)]
+pub use chain_file::{ChainFile, ChainFiles};
+#[doc(hidden)]
+pub use draws::widen;
+pub use draws::{ChainDraws, Quantity, quantities};
+#[doc(hidden)]
+pub use hash::{bytes_hash, text_hash};
+#[doc(hidden)]
+pub use modes::{DISAGREE, Mode, modes, modes_table};
+#[doc(hidden)]
+pub use moments::{Moments, Point};
+#[doc(hidden)]
+pub use number::{number, r_hat_text, seconds};
+pub use pcadlang_inference::diagnostics::Summary;
+#[doc(hidden)]
+pub use reread::{rename, reread};
+pub use rundir::{RunDir, RunDirError};
+pub use sinks::{Memory, Tee};
+#[doc(hidden)]
+pub use warnings::warnings;

@@ -1,0 +1,83 @@
+//! Pictures of draws, made from plain buffers: over the photograph, alone, or many on one
+//! sheet.
+//!
+//! This module does not render scenes; it colours rendered buffers. Rows go down, pixel
+//! (0, 0) is the upper left one, and its centre is at (0.5, 0.5). Missing pixels of short
+//! buffers count as background, so no input panics.
+
+mod dots;
+mod font;
+mod layers;
+mod limbs;
+mod sheet;
+mod strokes;
+mod surface;
+
+pub use dots::{DETECTED, OF_SCENE, dots};
+pub use layers::{depth, normals, parts, residuals};
+pub use limbs::limbs;
+pub use sheet::{captioned_sheet, contact_sheet};
+pub use strokes::{contour_map, contours};
+pub use surface::{frequency, mask, overlaid, overlay, shaded};
+
+/// Pictures are enlarged until their longer side has this many pixels.
+pub const LONGER_SIDE: u32 = 768;
+
+/// Returns the size of the pictures for a photograph of the given size: at least
+/// [`LONGER_SIDE`] along the longer side.
+pub fn picture_size(width: u32, height: u32) -> (u32, u32) {
+    let longer = width.max(height).max(1);
+    if longer >= LONGER_SIDE {
+        return (width, height);
+    }
+    let scale = |x: u32| (u64::from(x) * u64::from(LONGER_SIDE) / u64::from(longer)).max(1) as u32;
+    (scale(width), scale(height))
+}
+
+/// Encodes a picture as a PNG file.
+///
+/// # Errors
+/// Returns an error if the picture has no pixels.
+pub fn png<P>(picture: &image::ImageBuffer<P, Vec<u8>>) -> Result<Vec<u8>, image::ImageError>
+where
+    P: image::Pixel<Subpixel = u8> + image::PixelWithColorType,
+{
+    let mut bytes = Vec::new();
+    picture.write_to(&mut std::io::Cursor::new(&mut bytes), image::ImageFormat::Png)?;
+    Ok(bytes)
+}
+
+/// Encodes a picture as a JPEG file of a quality from 1 to 100.
+///
+/// # Errors
+/// Returns an error if the picture has no pixels.
+pub fn jpeg(picture: &image::RgbImage, quality: u8) -> Result<Vec<u8>, image::ImageError> {
+    let mut bytes = Vec::new();
+    let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, quality);
+    picture.write_with_encoder(encoder)?;
+    Ok(bytes)
+}
+
+/// Blends one colour over another.
+fn mix(under: [u8; 3], over: [f32; 3], share: f32) -> [u8; 3] {
+    [0, 1, 2].map(|c| {
+        (f32::from(under[c]) * (1.0 - share) + over[c].clamp(0.0, 255.0) * share).round() as u8
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_files() {
+        assert_eq!(picture_size(256, 128), (768, 384));
+        assert_eq!(picture_size(4000, 10), (4000, 10));
+        assert_eq!(picture_size(1, 100_000), (1, 100_000));
+        assert_eq!(picture_size(0, 0), (1, 1));
+        let picture = image::RgbImage::from_fn(5, 3, |x, y| image::Rgb([x as u8, y as u8, 7]));
+        let back = image::load_from_memory(&png(&picture).unwrap()).unwrap().to_rgb8();
+        assert_eq!(back, picture);
+        assert_eq!(mix([0, 100, 200], [100.0, 100.0, 300.0], 0.5), [50, 100, 228]);
+    }
+}

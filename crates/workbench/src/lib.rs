@@ -1,0 +1,11 @@
+//! What works on programs beside a run: the session of a prompt or a studio, what editors
+//! ask, proposals from banks, trade-offs of settings, scores.
+
+#![warn(missing_docs)]
+#![forbid(unsafe_code)]
+
+pub mod bank;
+pub mod editor;
+pub mod score;
+pub mod session;
+pub mod tradeoff;
