@@ -16,8 +16,8 @@
 use pcadlang::Program;
 use pcadlang::infer::draws::{Column, DrawRow, Sink};
 use pcadlang::infer::{Progress, RunOptions};
-use pcadlang::lang::load;
 use pcadlang::report::svg::Svg;
+use pcadlang::shipped;
 use pcadlang::vision::candidates::{CandidateOptions, candidates};
 use pcadlang::vision::{Limits, photo};
 use std::fmt::Write;
@@ -67,7 +67,7 @@ impl Sink for Recorder {
 /// Returns the text of a shipped program with a plan that records every step, with or
 /// without its proposals from the picture.
 fn program(name: &str, with: bool) -> Result<String, String> {
-    let text = load::embedded(name).ok_or_else(|| format!("{name} is not shipped"))?;
+    let text = shipped::file(name).ok_or_else(|| format!("{name} is not shipped"))?;
     let plan = text.rfind("infer {").ok_or_else(|| format!("{name} has no plan"))?;
     let steps = "repeat 1000000 { moves(); collect log_joint(); }";
     // For people, a short warm-up adapts the step sizes, and the search for modes moves

@@ -1,11 +1,11 @@
 //! Code shared by the recovery examples: a shipped program observes the clean contours of
 //! one of its own draws.
 
-use pcadlang::lang::load::embedded;
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
 use pcadlang::rng::{Purpose, StreamKey};
 use pcadlang::scene::{ImageValue, ViewValue};
+use pcadlang::shipped;
 use pcadlang::trace::{Draws, Trace};
 use pcadlang::vision::ContourMap;
 use pcadlang::{Model, Program};
@@ -31,7 +31,7 @@ pub fn compile(
     map: ContourMap,
 ) -> Result<Model, pcadlang::Error> {
     let image = Value::object(ImageValue::contours(map, None));
-    let program = Program::parse(embedded(program).unwrap_or_default())?
+    let program = Program::parse(shipped::file(program).unwrap_or_default())?
         .observe("photo", image)
         .camera(Camera::default_for(SIZE, SIZE))
         .set("clean", "true");

@@ -2,13 +2,13 @@
 
 use pcadlang::geom::armature::{Armature, morphs_from_json, rig_from_json};
 use pcadlang::geom::{GeomError, obj};
-use pcadlang::lang::load::embedded;
+use pcadlang::shipped;
 use std::sync::Arc;
 
 /// Loads a human body: `human.lod2` (coarse), `human.lod1` or `human`.
 pub fn human(lod: &str) -> Result<Arc<Armature>, GeomError> {
     let file =
-        |end: &str| embedded(&format!("std/human/{lod}.{end}")).unwrap_or_default().as_bytes();
+        |end: &str| shipped::file(&format!("std/human/{lod}.{end}")).unwrap_or_default().as_bytes();
     let rig = rig_from_json(file("rig.json"))?;
     let mesh = obj::indexed(file("obj"))?;
     let morphs = morphs_from_json(file("morphs.json"), &rig.rig)?;

@@ -16,6 +16,5 @@ mod readme;
 mod repl;
 mod report;
 mod runs;
-#[cfg(feature = "studio")]
 mod studio;
 mod tradeoff;

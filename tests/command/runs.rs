@@ -111,7 +111,7 @@ fn starts_of_the_lathe_are_seen_in_perspective() {
         infer { repeat 20 { mh(@x); collect x; } }";
     f.write("cup.pcad", cup);
     f.succeeds(&["run", "cup.pcad", "--chains", "1", "--quiet", "--out", "cup"]);
-    let text = pcadlang::lang::load::embedded("lathe.pcad").unwrap();
+    let text = pcadlang::shipped::file("lathe.pcad").unwrap();
     let (model, plan) = text.split_once("infer {").unwrap();
     let (from, _) = plan.split_once("from = ").unwrap().1.split_once("));").unwrap();
     let starts =
@@ -242,7 +242,6 @@ fn sheets_of_the_prior() {
 
 /// People are detected, written in a form that `--keypoints` reads, and drawn; an invalid
 /// network file is refused.
-#[cfg(feature = "models")]
 #[test]
 fn people_in_photographs() {
     let f = Folder::new("detect");

@@ -2,10 +2,10 @@
 //! probabilities by quadrature over the same pictures.
 
 use crate::common::{assert_mean, integrate};
-use pcadlang::lang::load::embedded;
 use pcadlang::lang::value::Value;
 use pcadlang::render::Camera;
 use pcadlang::scene::{ImageValue, ViewValue};
+use pcadlang::shipped;
 use pcadlang::trace::{Draws, Trace};
 use pcadlang::vision::ContourMap;
 use pcadlang::{Model, Program, RunOptions};
@@ -85,7 +85,7 @@ fn the_second_part_comes_and_goes_as_its_posterior_says() {
 /// those of a run from scratch.
 #[test]
 fn the_shipped_program_makes_and_removes_a_part() {
-    let text = embedded("lathe_parts.pcad").unwrap();
+    let text = shipped::file("lathe_parts.pcad").unwrap();
     let text = text.split("infer {").next().unwrap();
     let map = shown(&mut model(text, ContourMap::new(SIZE, SIZE)).simulate(5, 0).unwrap());
     let (mut trace, mut counts) = (model(text, map).simulate(3, 0).unwrap(), Vec::new());

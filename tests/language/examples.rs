@@ -27,7 +27,7 @@ fn files() -> Folder {
         std::fs::create_dir_all(f.path().join(folder)).unwrap();
     }
     for name in SHIPPED {
-        f.write(name, pcadlang::lang::load::embedded(name).unwrap());
+        f.write(name, pcadlang::shipped::file(name).unwrap());
     }
     f
 }

@@ -7,6 +7,7 @@ mod common;
 #[path = "../../crates/scene/src/vision/detect/forest/writer.rs"]
 mod forests;
 
+mod builtins;
 mod docs;
 mod editor;
 mod errors;

@@ -5,7 +5,5 @@
 mod common;
 
 mod api;
-mod architecture;
-mod circles;
 mod embedding;
 mod session;

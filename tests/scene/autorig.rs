@@ -8,7 +8,7 @@ use crate::common::folder::Folder;
 use glam::DVec3;
 use pcadlang::geom::armature::autorig;
 use pcadlang::geom::obj;
-use pcadlang::lang::load::embedded;
+use pcadlang::shipped;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
@@ -100,7 +100,7 @@ fn the_shipped_animal_is_the_one_made_here() {
     }
     assert!(made.len() < 60_000);
     assert!(
-        embedded("data/dog.obj") == Some(&made),
+        shipped::file("data/dog.obj") == Some(&made),
         "programs/data/dog.obj: REGENERATE=1 cargo test --release --test scene -- autorig::"
     );
     let mesh = obj::load(made.as_bytes()).unwrap();

@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3, Vec3};
 use pcadlang::geom::armature::{Armature, JointPose, Rules, rig_from_json};
 use pcadlang::geom::gltf::{Loaded, load};
 use pcadlang::geom::{FileFrame, Mesh, UpAxis, cuboid, glb as glb_file, obj, sphere};
-use pcadlang::lang::load::embedded;
+use pcadlang::shipped;
 use serde_json::{Value, json};
 
 fn none(path: &str) -> Result<Vec<u8>, String> {
@@ -22,7 +22,8 @@ fn read(bytes: &[u8]) -> Result<Loaded, String> {
 }
 
 fn body() -> Armature {
-    let file = |end: &str| embedded(&format!("std/human/human.lod2.{end}")).unwrap().as_bytes();
+    let file =
+        |end: &str| shipped::file(&format!("std/human/human.lod2.{end}")).unwrap().as_bytes();
     let rig = rig_from_json(file("rig.json")).unwrap();
     let mesh = obj::indexed(file("obj")).unwrap();
     Armature::new(rig.rig, mesh.positions, mesh.triangles, rig.influences).unwrap()

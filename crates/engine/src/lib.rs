@@ -7,4 +7,10 @@
 #![forbid(unsafe_code)]
 
 pub mod lang;
+#[cfg(test)]
+mod testing;
 pub mod trace;
+
+// The helpers of unit tests are shared with the crate above.
+#[cfg(test)]
+extern crate self as pcadlang_engine;

@@ -55,32 +55,6 @@ type OnDraw = dyn Fn(u32, &mut Trace) -> ControlFlow<()> + Send + Sync;
 /// [`RunOptions::callback`](super::RunOptions::callback). A closure ends the run by
 /// returning `ControlFlow::Break`; the run keeps its draws. Closures are called from the
 /// chains' threads.
-///
-/// ```
-/// use pcadlang::infer::Callbacks;
-/// use pcadlang::{Model, RunOptions};
-/// use std::ops::ControlFlow;
-/// use std::sync::Arc;
-/// use std::sync::atomic::{AtomicU64, Ordering};
-/// let seen = Arc::new(AtomicU64::new(0));
-/// let count = Arc::clone(&seen);
-/// let callbacks = Callbacks::new()
-///     .on_step(|_chain, steps, trace| match steps < 5000 && trace.log_joint().is_finite() {
-///         true => ControlFlow::Continue(()),
-///         false => ControlFlow::Break(()),
-///     })
-///     .on_draw(move |_chain, trace| match count.fetch_add(1, Ordering::Relaxed) {
-///         99 => ControlFlow::Break(()),
-///         _ => ControlFlow::Continue(assert!(trace.get("@x").is_ok())),
-///     });
-/// let model = Model::from_text(
-///     "assume x ~ normal(0, 1); observe normal(x, 1) = 2; infer { repeat 1000 { mh(@x); } }",
-/// )?;
-/// let options = RunOptions { callback: Some(Arc::new(callbacks)), ..RunOptions::default() };
-/// let posterior = model.run(&options, 1, 1)?;
-/// assert_eq!(posterior.draws[0].rows.len(), 100);
-/// # Ok::<(), pcadlang::Error>(())
-/// ```
 #[derive(Default)]
 pub struct Callbacks {
     all: Vec<Arc<dyn Callback>>,

@@ -60,22 +60,3 @@ fn share(
     prepare();
     time.saturating_sub(begun.elapsed()) / rounds
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use pcadlang_library::model::Model;
-
-    #[test]
-    fn chains_can_be_spread_over_calls() {
-        let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = 1;").unwrap();
-        let run = |first_chain, chains| {
-            let options =
-                RunOptions { seed: 3, steps: Some(50), first_chain, ..RunOptions::default() };
-            model.run(&options, chains, 2).unwrap().quantity("x").unwrap().chains
-        };
-        let together = run(0, 3);
-        assert_eq!([run(0, 1), run(1, 2)].concat(), together);
-        assert_ne!(together[0], together[1]);
-    }
-}

@@ -242,7 +242,7 @@ fn explain(t: &Trace) -> NoStart {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pcadlang_library::model::Model;
+    use crate::testing::compiled;
 
     /// Draws by updates of the draw before are those from scratch, also of choices that
     /// appear and vanish.
@@ -258,18 +258,18 @@ mod tests {
             kernel near(m) { propose s ~ flip(0.5); propose @x ~ normal(m + (if s { 1 } else { 0 }), 0.1);
               propose @f ~ mv_normal([0, m, 0], chol = 0.1 * identity(n)); propose @open ~ flip(0.7); }
             infer { init(best_of(30, keep = 5, from = near(2))); repeat 1 { drift(@x); } }";
-        let model = Model::from_text(text).unwrap();
-        let (plan, _) = model.plan().unwrap();
+        let compiled_text = compiled(text);
+        let plan = &compiled_text.plans[0];
         let kernels: Arc<[_]> = Arc::clone(&plan.kernels);
         let from = ProgramKernel::new(kernels, 0, vec![Value::Num(2.0)], Instant::now());
         assert!(from.ignores_the_state());
         let key = StreamKey::new(7, 0, Purpose::START);
         let limits = Limits::default();
-        let (code, from) = (model.code(), Some(&from));
+        let (code, from) = (&compiled_text.code, Some(&from));
         let mut source = Source { code, seed: 7, chain: 0, key, from, limits: &limits, last: None };
         // What depends on a choice is another matter.
         let other = text.replace("normal(m +", "normal(m + x +");
-        let (plan, _) = Model::from_text(&other).unwrap().plan().unwrap();
+        let plan = &compiled(&other).plans[0];
         let own = ProgramKernel::new(Arc::clone(&plan.kernels), 0, Vec::new(), Instant::now());
         assert!(!own.ignores_the_state());
         let mut opened = 0;

@@ -28,6 +28,9 @@ mod sites;
 mod state;
 mod stats;
 mod structure;
+#[cfg(test)]
+#[path = "../../engine/src/testing.rs"]
+mod testing;
 
 pub use callback::{Callback, Callbacks};
 pub use calls::explained::{Selecting, selecting};

@@ -134,7 +134,7 @@ impl Population {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pcadlang_library::model::Model;
+    use crate::testing::draw;
     use pcadlang_numerics::rng::{Purpose, StreamKey};
 
     fn population(log_likelihoods: &[f64]) -> Population {
@@ -182,8 +182,8 @@ mod tests {
     /// not one by one.
     #[test]
     fn members_go_by_thirds() {
-        let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = 0;").unwrap();
-        let begun: Vec<Trace> = (0..12).map(|i| model.simulate(1, i).unwrap()).collect();
+        let text = "assume x ~ normal(0, 1); observe normal(x, 1) = 0;";
+        let begun: Vec<Trace> = (0..12).map(|i| draw(text, 1, i)).collect();
         let mut rng = StreamKey::new(1, 0, Purpose::POPULATION).stream(0, 0, 0);
         let (mut trace, mut p) = (begun[0].clone(), Population::new(&begun));
         let mut sizes = vec![12];
@@ -199,8 +199,8 @@ mod tests {
 
     #[test]
     fn the_turns_of_all_members_are_equally_long() {
-        let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = 0;").unwrap();
-        let begun: Vec<Trace> = (0..3).map(|i| model.simulate(1, i).unwrap()).collect();
+        let text = "assume x ~ normal(0, 1); observe normal(x, 1) = 0;";
+        let begun: Vec<Trace> = (0..3).map(|i| draw(text, 1, i)).collect();
         let value = |t: &Trace| t.stored(t.all_targets()[0]);
         let mut rng = StreamKey::new(1, 0, Purpose::POPULATION).stream(0, 0, 0);
         let (mut trace, mut p) = (begun[0].clone(), Population::new(&begun));

@@ -193,12 +193,13 @@ impl Callback for Predictive {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::{compiled, trace};
     use crate::{Progress, RunOptions, draws::Discard, run_chains};
-    use pcadlang_library::model::Model;
 
     const TEXT: &str = "assume m ~ normal(0, 2);
          for i in 0 .. 4 { observe normal(m, 1) = i as x; }
-         observe normal(m, 1) = [1, 2] as y; factor(0) as soft;";
+         observe normal(m, 1) = [1, 2] as y; factor(0) as soft;
+         infer { warmup 1000 { nuts(@m); } repeat 1000 { nuts(@m); } }";
 
     #[test]
     fn statistics_and_tails() {
@@ -212,8 +213,8 @@ mod tests {
     /// variance 4: mean 1.44, variance 0.16.
     #[test]
     fn predictive_draws_have_the_exact_moments() {
-        let model = Model::from_text(TEXT).unwrap();
-        let now = observed(&model.simulate(0, 0).unwrap());
+        let compiled = compiled(TEXT);
+        let now = observed(&trace(TEXT, 0));
         let names: Vec<&str> = now.groups.iter().map(|g| &*g.name).collect();
         assert_eq!(
             (names, now.groups[0].numbers.clone()),
@@ -224,8 +225,8 @@ mod tests {
             let [mean, sd, ..] = statistics(&xs);
             (mean, sd * sd)
         };
-        let from_prior = prior(model.code(), 3, 4000, 2, Limits::default()).unwrap();
-        assert_eq!(from_prior, prior(model.code(), 3, 4000, 1, Limits::default()).unwrap());
+        let from_prior = prior(&compiled.code, 3, 4000, 2, Limits::default()).unwrap();
+        assert_eq!(from_prior, prior(&compiled.code, 3, 4000, 1, Limits::default()).unwrap());
         assert_eq!(from_prior[0].silent, [("@soft".to_owned(), "a factor".to_owned())]);
         let (mean, variance) = moments(&from_prior);
         assert!(mean.abs() < 0.2 && (variance - 5.0).abs() < 0.6, "{mean} {variance}");
@@ -235,10 +236,9 @@ mod tests {
             callback: Some(Arc::new(callback.clone())),
             ..RunOptions::default()
         };
-        let (plan, _) = model.plan().unwrap();
         let done = run_chains(
-            model.code(),
-            &plan,
+            &compiled.code,
+            &compiled.plans[0],
             &options,
             1,
             &Progress::default(),

@@ -44,32 +44,3 @@ impl Sites {
         all
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use crate::RunOptions;
-    use crate::draws::SiteStats;
-    use pcadlang_library::model::Model;
-
-    #[test]
-    fn single_site_kernels_are_counted_by_address() {
-        let model = Model::from_text(
-            "assume c ~ flip(0.5); assume x = if c { a ~ normal(0, 1); a } else { b ~ normal(1, 1); b };
-             assume z ~ iid(normal(0, 1), 2);
-             observe normal(x + z[0] - z[1], 1) = 0;
-             infer { warmup 100 { mh(one(@**)); } repeat 3000 { mh(one(@**)); gibbs(@c); drift(one($continuous)); } }",
-        )
-        .unwrap();
-        let done = model.run(&RunOptions { sites: true, ..RunOptions::default() }, 2, 1).unwrap();
-        let all = SiteStats::total(done.chains.iter().flat_map(|c| &c.sites));
-        let names: Vec<&str> = all.iter().map(|s| &*s.address).collect();
-        assert_eq!(names, ["@c", "@x/a", "@x/b", "@z[0]", "@z[1]"]);
-        // Every choice still exists after a step that picks it, so every proposal counts
-        // at some address.
-        let proposals: u64 = done.chains.iter().flat_map(|c| &c.kernels).map(|k| k.proposals).sum();
-        assert_eq!(all.iter().map(|s| s.proposals).sum::<u64>(), proposals);
-        assert!(all.iter().all(|s| s.acceptance().is_some_and(|a| a > 0.05 && a < 1.0)), "{all:?}");
-        let silent = model.run(&RunOptions::default(), 1, 1).unwrap();
-        assert!(silent.chains[0].sites.is_empty());
-    }
-}

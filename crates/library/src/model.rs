@@ -1,13 +1,4 @@
 //! Embedding: a program compiled with its data, run to a posterior, in a few calls.
-//!
-//! ```
-//! use pcadlang::{Model, RunOptions};
-//! let model = Model::from_text("assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;")?;
-//! let posterior = model.run(&RunOptions { steps: Some(2000), ..RunOptions::default() }, 2, 2)?;
-//! let x = &posterior.quantity("x").unwrap().summary;
-//! assert!((x.mean - 1.6).abs() < 0.2);
-//! # Ok::<(), pcadlang::Error>(())
-//! ```
 
 mod camera;
 mod edited;

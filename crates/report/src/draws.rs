@@ -25,14 +25,6 @@ impl Default for ChainDraws {
 
 impl Quantity {
     /// Returns the reason why R-hat is undefined; `None` if it is defined.
-    ///
-    /// ```
-    /// let model = pcadlang::Model::from_text("assume x ~ normal(0, 1); infer { repeat 100 { collect x; } }")?;
-    /// let posterior = model.run(&pcadlang::RunOptions::default(), 2, 1)?;
-    /// let why = posterior.quantity("x").and_then(|q| q.why_no_r_hat());
-    /// assert_eq!(why, Some("it never moved in any chain, and the chains have different values"));
-    /// # Ok::<(), pcadlang::Error>(())
-    /// ```
     pub fn why_no_r_hat(&self) -> Option<&'static str> {
         if !self.summary.r_hat.is_nan() {
             return None;

@@ -192,13 +192,9 @@ impl Graph {
 mod tests {
     use super::*;
     use crate::trace::Change;
-    use pcadlang_library::model::Model;
 
     fn trace(text: &str) -> Trace {
-        Model::from_text(text)
-            .unwrap_or_else(|e| panic!("{e}"))
-            .simulate(3, 0)
-            .unwrap_or_else(|e| panic!("{e}"))
+        crate::testing::trace(text, 3)
     }
 
     fn at(t: &Trace, address: &str) -> Target {

@@ -102,19 +102,6 @@ impl Trace {
     /// its address and the log densities of its elements (a single one if it has no
     /// elements). Sorted by hash, so that the same observations come in the same order.
     /// `None` if there are more than `most` values.
-    ///
-    /// ```
-    /// let model = pcadlang::Model::from_text("assume x ~ normal(0, 1); observe normal(x, 1) = [1, 2] as y; observe poisson(3) = 2 as k;")?;
-    /// let trace = model.simulate(1, 0)?;
-    /// let all = trace.pointwise(100).unwrap_or_default();
-    /// let sum: f64 = all.iter().flat_map(|(_, scores)| scores).sum();
-    /// assert!((sum - trace.log_likelihood()).abs() < 1e-12);
-    /// let mut points = trace.points(100);
-    /// points.sort_by(|a, b| a.0.cmp(&b.0));
-    /// assert_eq!(points, [("k".to_owned(), 2.0), ("y[0]".to_owned(), 1.0), ("y[1]".to_owned(), 2.0)]);
-    /// assert!(trace.pointwise(2).is_none());
-    /// # Ok::<(), pcadlang::Error>(())
-    /// ```
     pub fn pointwise(&self, most: usize) -> Option<Vec<(u64, Vec<f64>)>> {
         let (g, code) = (&self.graph, &*self.code);
         let (mut all, mut count) = (Vec::new(), 0);
@@ -341,7 +328,6 @@ fn sample_like(dist: &Dist, observed: &Value, rng: &mut Stream) -> Value {
 mod tests {
     use super::*;
     use crate::trace::Change;
-    use pcadlang_library::model::Model;
     use pcadlang_numerics::rng::{Purpose, StreamKey};
 
     fn draws(step: u64) -> Draws {
@@ -349,10 +335,7 @@ mod tests {
     }
 
     fn trace(text: &str) -> Trace {
-        Model::from_text(text)
-            .unwrap_or_else(|e| panic!("{e}"))
-            .simulate(1, 0)
-            .unwrap_or_else(|e| panic!("{e}"))
+        crate::testing::trace(text, 1)
     }
 
     const TEXT: &str = "assume x ~ normal(0, 1); assume c ~ flip(0.5);

@@ -102,39 +102,6 @@ impl Trace {
     /// until [`Trace::commit`] or [`Trace::rollback`]; it can also be undone after that
     /// ([`Update::discarded`]), bit for bit.
     ///
-    /// ```
-    /// use pcadlang::Model;
-    /// use pcadlang::lang::value::Value;
-    /// use pcadlang::rng::{Purpose, StreamKey};
-    /// use pcadlang::trace::{Draws, Selector};
-    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// let model = Model::from_text(
-    ///     "assume spare ~ flip(0.2);
-    ///      assume x = if spare { a ~ normal(0, 1); a } else { 3 };
-    ///      observe normal(x, 1) = 2.5 as y;",
-    /// )?;
-    /// let mut trace = model.simulate(1, 0)?;
-    /// let draws = Draws { key: StreamKey::new(1, 0, Purpose::VALUES), step: 0, substream: 0 };
-    ///
-    /// // One update changes the branch, gives a value to the choice that appears in it,
-    /// // and replaces the data; another one undoes it.
-    /// trace.set("@spare", false, draws)?;
-    /// let before = trace.log_joint();
-    /// let given = [("@spare".parse()?, true.into()), ("@x/a".parse()?, 1.5.into()), ("@y".parse()?, 2.0.into())];
-    /// let there = trace.update(&given, draws)?;
-    /// trace.commit();
-    /// assert!(matches!(trace.get("@x/a")?, Value::Num(1.5)));
-    /// let back = trace.update(&there.discarded, draws)?;
-    /// assert_eq!(back.log_weight, -there.log_weight);
-    /// assert_eq!(trace.log_joint().to_bits(), before.to_bits());
-    /// trace.commit();
-    ///
-    /// assert_eq!(trace.project(&Selector::All), trace.log_joint());
-    /// assert!(trace.get("@spar").unwrap_err().to_string().contains("did you mean `@spare`?"));
-    /// # Ok(())
-    /// # }
-    /// ```
-    ///
     /// # Errors
     /// If an address is not in the updated trace (the message names the nearest one that
     /// is), if a value does not fit its choice, or if the program fails; the trace is

@@ -99,7 +99,7 @@ impl<'a> Reader<'a, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pcadlang_library::model::Model;
+    use crate::testing::{compiled, trace};
 
     #[test]
     fn kernels_within_declared_ones_are_found() {
@@ -107,9 +107,8 @@ mod tests {
              kernel first(s) { drift(@x, s); }
              kernel both(s) { first(s); mh(@y); }
              infer { repeat 10 { both(0.5); block(@x); both(2); } }";
-        let model = Model::from_text(text).unwrap();
-        let (mut trace, plan) = (model.simulate(1, 0).unwrap(), model.plan().unwrap().0);
-        let found = selecting(&plan, &mut trace);
+        let (mut trace, plan) = (trace(text, 1), &compiled(text).plans[0]);
+        let found = selecting(plan, &mut trace);
         let names: Vec<&str> = found.iter().map(|k| &*k.kernel).collect();
         assert_eq!(names, ["drift(@x, s)", "mh(@y)", "block(@x)"]);
     }

@@ -101,39 +101,3 @@ impl Callback for BestSoFar {
         Ok(())
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{Model, RunOptions};
-
-    #[test]
-    fn the_best_state_is_the_best_that_steps_saw() {
-        let model = Model::from_text(
-            "assume x ~ normal(0, 1); observe normal(x, 0.1) = 1;
-             infer { warmup 400 { drift(@x); } repeat 400 { drift(@x); collect x; } }",
-        )
-        .unwrap();
-        let best = Arc::new(BestSoFar::new(2, &Arc::default()));
-        let options = RunOptions { callback: Some(best.clone()), seed: 3, ..RunOptions::default() };
-        let posterior = model.run(&options, 2, 1).unwrap();
-        let drawn = posterior.scalars().into_iter().find(|q| q.0 == "log_joint").unwrap().1;
-        let state = best.state().unwrap();
-        // The density is greatest at 100/101; one of hundreds of states is near it.
-        let greatest = model_density(100.0 / 101.0);
-        assert!(state.log_joint <= greatest && state.log_joint > greatest - 0.01, "{state:?}");
-        assert!(drawn.iter().all(|l| *l <= state.log_joint), "no draw is better");
-        assert_eq!(f64::from_bits(best.progress.best.load(Ordering::Relaxed)), state.log_joint);
-        let again = BestSoFar::new(2, &Arc::default());
-        (0..2).for_each(|c| again.load(c, &best.save(c)).unwrap());
-        assert_eq!(again.state(), Some(state));
-        assert!(again.load(0, b"no state").is_err());
-    }
-
-    fn model_density(x: f64) -> f64 {
-        let normal = |z: f64, sd: f64| {
-            -0.5 * (z / sd) * (z / sd) - sd.ln() - 0.5 * std::f64::consts::TAU.ln()
-        };
-        normal(x, 1.0) + normal(1.0 - x, 0.1)
-    }
-}

@@ -97,36 +97,3 @@ impl Callback for Trajectory {
         Ok(())
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{Model, RunOptions};
-    use std::sync::Arc;
-
-    #[test]
-    fn the_first_steps_are_kept_densely_and_later_ones_rarely() {
-        let model = Model::from_text(
-            "assume x ~ normal(0, 1); observe normal(x, 0.01) = 3;
-             infer { warmup 1000 { drift(@x); } repeat 3000 { drift(@x); collect x; } }",
-        )
-        .unwrap();
-        let way = Arc::new(Trajectory::new(2, model.hash()));
-        let options = RunOptions { callback: Some(way.clone()), seed: 3, ..RunOptions::default() };
-        model.run(&options, 2, 1).unwrap();
-        let one = way.of_chain(1);
-        assert!((40..90).contains(&one.len()), "{}", one.len());
-        assert!(one.iter().all(|s| s.chain == 2) && one[0].step <= 1);
-        assert!(one.windows(2).all(|w| w[1].step > w[0].step));
-        assert!(one[0].log_joint < one[one.len() - 1].log_joint - 100.0, "from prior to posterior");
-        // A run that went on after its last checkpoint is resumed from there.
-        let again = Trajectory::new(2, model.hash());
-        let saved = [0, 1].map(|c| way.save(c));
-        let later = TrajectoryState { step: 1_000_000, ..one[0].clone() };
-        again.restore(way.all().into_iter().chain([later]).collect());
-        assert_eq!(again.count(), way.count() + 1);
-        (0..2).for_each(|c| again.load(c, &saved[c as usize]).unwrap());
-        assert_eq!(again.all(), way.all());
-        assert!(again.load(0, b"no state").is_err());
-    }
-}

@@ -67,23 +67,6 @@ impl Entry {
     }
 
     /// Creates a function.
-    ///
-    /// ```
-    /// use pcadlang::host::{Entry, Fault, Host, Type};
-    /// use pcadlang::{Program, Value};
-    /// let table = vec![3.0, 1.0, 2.0];
-    /// let look_up = Entry::function("look_up", move |a| {
-    ///     let i = a.int_in(0, 0, 2)?;
-    ///     Ok(Value::Num(table[i as usize]))
-    /// })
-    /// .argument("i", Type::Int, "Which one.")
-    /// .section("The host's tables")
-    /// .returns(Type::Num)
-    /// .flat();
-    /// let model = Program::parse("let x = look_up(0); predict y ~ normal(x, 1);")?.host(&Host::new().with(look_up))?;
-    /// assert!(model.compile().is_ok());
-    /// # Ok::<(), pcadlang::Error>(())
-    /// ```
     pub fn function(
         name: impl Into<Cow<'static, str>>,
         call: impl Fn(&Args) -> Result<Value, Fault> + Send + Sync + 'static,
@@ -99,40 +82,6 @@ impl Entry {
     /// a state of the trace: a rejected proposal restores the previous one, and forks of
     /// a trace share it. It is never modified in place, so a large state should share its
     /// unchanged parts.
-    ///
-    /// ```
-    /// use pcadlang::host::{Entry, Fault, Host, Previous, Type};
-    /// use pcadlang::trace::{Draws, Trace};
-    /// use pcadlang::{Program, Value};
-    /// use std::sync::Arc;
-    /// use std::sync::atomic::{AtomicUsize, Ordering};
-    /// // The sum of the squares of whole numbers, which is exact in any order.
-    /// let squared = Arc::new(AtomicUsize::new(0));
-    /// let count = Arc::clone(&squared);
-    /// let squares = Entry::incremental("squares", move |a, previous: Option<Previous<Vec<f64>>>| {
-    ///     let xs = a.array(0)?;
-    ///     let mut each = match &previous {
-    ///         Some(p) if p.state().len() == xs.len() => p.state().clone(),
-    ///         _ => vec![0.0; xs.len()],
-    ///     };
-    ///     let changed = previous.and_then(|p| p.changed_elements(a, 0)).unwrap_or((0..xs.len()).collect());
-    ///     for i in changed {
-    ///         count.fetch_add(1, Ordering::Relaxed);
-    ///         each[i] = xs[i] * xs[i];
-    ///     }
-    ///     Ok((Value::Num(each.iter().sum()), each))
-    /// })
-    /// .argument("xs", Type::Array, "Numbers.");
-    /// let text = "assume a ~ poisson(4); assume b ~ poisson(4); observe normal(squares([a, b]), 1) = 25;";
-    /// let model = Program::parse(text)?.host(&Host::new().with(squares))?.compile()?;
-    /// let mut trace = model.simulate(1, 0)?;
-    /// for (address, value) in [("@a", 3.0), ("@b", 4.0), ("@a", 5.0)] {
-    ///     squared.store(0, Ordering::Relaxed);
-    ///     trace.set(address, value, Draws::default()).unwrap();
-    ///     assert!(squared.load(Ordering::Relaxed) <= 1);
-    /// }
-    /// # Ok::<(), pcadlang::Error>(())
-    /// ```
     pub fn incremental<S: Send + Sync + 'static>(
         name: impl Into<Cow<'static, str>>,
         call: impl Fn(&Args, Option<Previous<'_, S>>) -> Result<(Value, S), Fault>
@@ -176,43 +125,6 @@ impl Entry {
 
     /// A kind of data files: what may stand after the colon of `data d: kind;`. Its first
     /// argument is the file; further ones are options of the format.
-    ///
-    /// ```
-    /// use pcadlang::host::{Beside, DataFormat, DataOptions, Entry, Fault, FaultKind, Host, Type};
-    /// use pcadlang::{Program, Value};
-    /// use std::sync::Arc;
-    /// /// One number a line.
-    /// #[derive(Debug)]
-    /// struct Numbers;
-    /// impl DataFormat for Numbers {
-    ///     fn load(
-    ///         &self,
-    ///         file: &str,
-    ///         bytes: &[u8],
-    ///         _: &DataOptions,
-    ///         _: &Beside,
-    ///     ) -> Result<Value, Fault> {
-    ///         let numbers: Result<Vec<f64>, _> =
-    ///             String::from_utf8_lossy(bytes).lines().map(str::parse).collect();
-    ///         numbers
-    ///             .map(Value::array)
-    ///             .map_err(|e| Fault::new(FaultKind::Other, format!("{file}: {e}")))
-    ///     }
-    /// }
-    /// let host = Host::new().with(
-    ///     Entry::data("numbers", Type::Array, Arc::new(Numbers)).about("Numbers, one a line."),
-    /// );
-    /// let file = std::env::temp_dir().join(format!("numbers-{}.txt", std::process::id()));
-    /// std::fs::write(&file, "1\n2.5\n").unwrap();
-    /// let text = "data d: numbers; predict x ~ normal(sum(d), 1);";
-    /// let program = Program::parse(text)?.host(&host)?;
-    /// assert!(program.clone().observe_file("d", &file.to_string_lossy())?.compile().is_ok());
-    /// std::fs::write(&file, "1\ntwo\n").unwrap();
-    /// let wrong = program.observe_file("d", &file.to_string_lossy()).err().unwrap();
-    /// assert!(wrong.to_string().contains("invalid float literal"));
-    /// std::fs::remove_file(&file).unwrap();
-    /// # Ok::<(), pcadlang::Error>(())
-    /// ```
     pub fn data(
         name: impl Into<Cow<'static, str>>,
         returns: Type,
@@ -337,15 +249,6 @@ impl Entry {
 
     /// An example of its use, for `doc`: an expression with its value behind `//`, or a
     /// program.
-    ///
-    /// ```
-    /// use pcadlang::Value;
-    /// use pcadlang::host::{Entry, Host, Type};
-    /// let half = Entry::function("half", |a| Ok(Value::Num(0.5 * a.num(0)?)))
-    ///     .argument("x", Type::Num, "A number.")
-    ///     .example("half(3) // 1.5");
-    /// assert!(Host::new().with(half).doc("half").unwrap().contains("half(3) // 1.5"));
-    /// ```
     #[must_use]
     pub fn example(mut self, text: impl Into<Cow<'static, str>>) -> Entry {
         self.builtin.example = Some(text.into());
@@ -353,17 +256,6 @@ impl Entry {
     }
 
     /// It takes the place of the language's own of that name.
-    ///
-    /// ```
-    /// use pcadlang::host::{Entry, Host, Type};
-    /// use pcadlang::{Program, Value};
-    /// let sqrt = || Entry::function("sqrt", |a| Ok(Value::Num(a.num(0)?.abs().sqrt()))).argument("x", Type::Num, "A number.");
-    /// let program = || Program::parse("let x = sqrt(-4);");
-    /// let taken = program()?.host(&Host::new().with(sqrt())).err().unwrap();
-    /// assert!(taken.to_string().contains("`sqrt` is a built-in of the language"));
-    /// assert!(program()?.host(&Host::new().with(sqrt().replacing()))?.compile().is_ok());
-    /// # Ok::<(), pcadlang::Error>(())
-    /// ```
     #[must_use]
     pub fn replacing(mut self) -> Entry {
         self.replaces = true;

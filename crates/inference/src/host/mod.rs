@@ -3,29 +3,6 @@
 //!
 //! A [`Host`] is a list of [`Entry`]s. They join the table of built-ins, so that static
 //! checks, error messages, completion and `doc` treat them like those of the language.
-//!
-//! ```
-//! use pcadlang::host::{Adjoint, Entry, Host, Type};
-//! use pcadlang::{Program, Value};
-//! // A drag function with a captured constant and its derivative.
-//! let density = 1.2;
-//! let drag = Entry::function("drag", move |a| Ok(Value::Num(0.5 * density * a.num(0)? * a.num(0)?)))
-//!     .argument("speed", Type::Num, "How fast it moves.").unit("m/s")
-//!     .returns(Type::Num)
-//!     .about("The drag of a unit area.")
-//!     .gradient(move |a, _, by| Some(vec![Adjoint::Num(by.number() * density * a.num(0).ok()?)]));
-//! let host = Host::new().with(drag);
-//! let text = "assume v ~ normal(10, 2); observe normal(drag(v), 1) = 55; infer { warmup 200 { hmc(@v); } repeat 500 { hmc(@v); } }";
-//! let model = Program::parse(text)?.host(&host)?.compile()?;
-//! let posterior = model.run(&Default::default(), 1, 1)?;
-//! let v = posterior.quantity("v").unwrap().summary.mean;
-//! assert!((v - 9.57).abs() < 0.1, "{v}");
-//!
-//! assert!(host.doc("drag").unwrap().contains("number, m/s."));
-//! let wrong = Program::parse("let d = drag(speeed = 1);")?.host(&host)?.compile().unwrap_err();
-//! assert!(wrong.to_string().contains("did you mean `speed`?"));
-//! # Ok::<(), pcadlang::Error>(())
-//! ```
 
 mod checked;
 mod entry;
@@ -76,28 +53,6 @@ impl Host {
     }
 
     /// Adds a hook that prepares the inputs of programs before they are compiled.
-    ///
-    /// ```
-    /// use indexmap::IndexMap;
-    /// use pcadlang::host::{Defaults, Host, InputHook};
-    /// use pcadlang::{Program, Value};
-    /// use std::sync::Arc;
-    /// /// Gives programs the number of seconds in a day as `day`, unless they have one.
-    /// #[derive(Debug)]
-    /// struct Day;
-    /// impl InputHook for Day {
-    ///     fn prepare(&self, data: &mut IndexMap<String, Value>, _: &mut Defaults) {
-    ///         data.entry("day".into()).or_insert(Value::Num(86_400.0));
-    ///     }
-    ///     fn adapt(&self, value: Value, _: &Defaults) -> Value {
-    ///         value
-    ///     }
-    /// }
-    /// let host = Host::new().hook(Arc::new(Day));
-    /// let model = Program::parse("data day; predict t ~ uniform(0, day);")?.host(&host)?.compile()?;
-    /// assert!(model.simulate(1, 0).is_ok());
-    /// # Ok::<(), pcadlang::Error>(())
-    /// ```
     #[must_use]
     pub fn hook(mut self, hook: Arc<dyn InputHook>) -> Host {
         self.hooks.push(hook);

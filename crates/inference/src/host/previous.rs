@@ -37,29 +37,6 @@ impl<'a, S> Previous<'a, S> {
     /// Returns whether argument `i` differs from its earlier value. Numbers are compared
     /// by their bits; distributions, likelihoods and objects only by pointer. Values that
     /// share a pointer are equal without a comparison of their contents.
-    ///
-    /// ```
-    /// use pcadlang::host::{Entry, Host, Previous, Type};
-    /// use pcadlang::trace::Draws;
-    /// use pcadlang::{Program, Value};
-    /// // `slow(mesh, x)` prepares `mesh`, and does so again only when `mesh` changes.
-    /// let slow = Entry::incremental("slow", |a, previous: Option<Previous<f64>>| {
-    ///     let prepared = match previous {
-    ///         Some(p) if !p.changed(a, 0) => {
-    ///             assert!(p.argument(0).same(a.get(0)) && p.value().same(&Value::Num(*p.state())));
-    ///             *p.state()
-    ///         }
-    ///         _ => a.num(0)? + 1.0,
-    ///     };
-    ///     Ok((Value::Num(prepared), prepared))
-    /// })
-    /// .argument("mesh", Type::Num, "What is prepared.")
-    /// .argument("x", Type::Num, "The rest.");
-    /// let text = "assume m ~ normal(0, 1); assume x ~ normal(0, 1); observe normal(slow(m, x), 1) = 0;";
-    /// let mut trace = Program::parse(text)?.host(&Host::new().with(slow))?.compile()?.simulate(1, 0)?;
-    /// trace.set("@x", 2.0, Draws::default()).unwrap();
-    /// # Ok::<(), pcadlang::Error>(())
-    /// ```
     pub fn changed(&self, a: &Args, i: usize) -> bool {
         !self.argument(i).same(a.get(i))
     }

@@ -180,7 +180,6 @@ mod tests {
     use super::*;
     use crate::Pick;
     use pcadlang_engine::trace::{ChoiceKind, Selector};
-    use pcadlang_library::model::Model;
 
     /// One program whose choices do not depend on the value, and one in which one of the
     /// values has an additional choice.
@@ -192,7 +191,7 @@ mod tests {
              observe normal(m, 1) = 1;",
         ];
         for text in texts {
-            let mut trace = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
+            let mut trace = crate::testing::trace(text, 1);
             let finite = Selector::Kind(ChoiceKind::Finite);
             let selection = trace.select(&finite);
             let k = trace.targets(selection)[0];

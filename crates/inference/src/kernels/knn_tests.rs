@@ -4,12 +4,12 @@
 use super::*;
 use crate::Pick;
 use crate::neighbours::Latents;
-use crate::{Model, trace::Constraint};
+use pcadlang_engine::trace::Constraint;
 use pcadlang_engine::trace::{Draws, Selector, Trace};
 use pcadlang_numerics::rng::{Purpose, StreamKey};
 
 fn trace(text: &str) -> Trace {
-    Model::from_text(text).unwrap().simulate(3, 0).unwrap()
+    crate::testing::trace(text, 3)
 }
 
 fn kernel(entries: Vec<Latents>, among: &[Latents]) -> Knn {

@@ -14,8 +14,6 @@ mod compare_keypoints;
 pub mod data;
 mod edges;
 mod examples;
-#[cfg(test)]
-mod gradient_tests;
 mod inputs;
 
 mod objects;

@@ -27,7 +27,6 @@ pub enum VisionError {
     /// The bytes are not those of a PNG or JPEG picture.
     #[error("not a picture: the file does not start like a PNG or JPEG file{0}")]
     NotAnImage(&'static str),
-    /// The build cannot decode pictures.
     /// The picture ends early.
     #[error("the picture is truncated: the file ends before the last pixel")]
     Truncated,

@@ -36,7 +36,7 @@ impl Builtin {
     ///
     /// # Errors
     /// If the arguments are invalid, or it is a form or a name for inference.
-    pub(crate) fn apply(&self, values: &[&Value]) -> Result<Value, Fault> {
+    pub fn apply(&self, values: &[&Value]) -> Result<Value, Fault> {
         let args = Args { builtin: self, values };
         match self.kind {
             Kind::Function(f) => f(&args),

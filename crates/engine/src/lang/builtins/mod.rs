@@ -39,6 +39,3 @@ pub(crate) use reduce::dot;
 pub use row::Resume;
 pub use row::{Arg, Row, arg, function, opt};
 pub use table::{Constant, Defaults, InputHook, Table};
-
-#[cfg(test)]
-pub(crate) mod tests;

@@ -2,7 +2,6 @@
 //! proposed in the trace.
 
 use crate::trace::{Change, ChoiceKind, Draws, Selector, Target, Trace};
-use pcadlang_library::model::Model;
 use pcadlang_numerics::num::log_sum_exp;
 use pcadlang_numerics::rng::{Purpose, StreamKey};
 
@@ -53,7 +52,7 @@ fn selected(trace: &mut Trace, kind: ChoiceKind) -> Vec<Target> {
 
 /// A state of a program that keeps all its choices, those to sum out, and those that move.
 fn begun(text: &str, seed: u64) -> (Trace, Vec<Target>, Vec<Target>) {
-    let mut trace = Model::from_text(text).unwrap().simulate(seed, 0).unwrap();
+    let mut trace = crate::testing::trace(text, seed);
     let _held = trace.hold_choices().unwrap();
     let sites = selected(&mut trace, ChoiceKind::Finite);
     let moving = selected(&mut trace, ChoiceKind::Continuous);

@@ -3,16 +3,11 @@
 
 use super::*;
 use crate::trace::{Change, Draws, Selector, Target, Trace};
-use crate::{Model, Program};
-
-fn model(text: &str) -> Model {
-    Program::parse(text).unwrap().compile().unwrap()
-}
 
 /// Counts the weights and moves that local densities gave, over the states of a random
 /// walk through the prior; all are compared with updates.
 fn compared(text: &str) -> [usize; 2] {
-    let mut trace = model(text).simulate(1, 0).unwrap();
+    let mut trace = crate::testing::trace(text, 1);
     let every = Selector::Tag { name: "d".into(), value: None };
     let (mut weights, mut moves) = (0, 0);
     for step in 0..60 {

@@ -162,7 +162,6 @@ mod tests {
     use super::*;
     use crate::Pick;
     use pcadlang_engine::trace::{Draws, Selector};
-    use pcadlang_library::model::Model;
 
     /// -2 |y|^2 has the gradient -4 y: one step along an axis determines the curvature in
     /// all directions.
@@ -177,7 +176,7 @@ mod tests {
     fn a_narrow_ridge_takes_few_steps() {
         let text =
             "assume a ~ normal(0, 1); assume b ~ normal(0, 1); observe normal(a + b, 0.1) = 1;";
-        let mut trace = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
+        let mut trace = crate::testing::trace(text, 1);
         for (address, x) in [("@a", 2.0), ("@b", -1.0)] {
             trace.set(address, x, Draws::default()).unwrap();
         }
@@ -196,7 +195,7 @@ mod tests {
     fn a_slope_that_is_almost_straight_is_climbed_by_its_gradient() {
         // Symmetric about 50, and straight on both sides.
         let text = "assume x ~ flat(); factor(x - 2 * log1p(exp(x - 50)));";
-        let mut trace = Model::from_text(text).unwrap().simulate(1, 0).unwrap();
+        let mut trace = crate::testing::trace(text, 1);
         trace.set("@x", 15.0, Draws::default()).unwrap();
         let scope = SiteSelection { selector: Selector::All, pick: Pick::All };
         Optimize::new(scope, 60).step(&mut trace, &StepContext::new(1, 0, 0)).unwrap();

@@ -1,19 +1,21 @@
 //! Tests of the built-ins through the table, as programs call them.
 
+mod gradients;
 mod lists;
 mod maths;
 mod operators;
+mod search;
 mod table;
 
-pub(crate) use super::{Args, Builtin, Kind, Table};
-use crate::lang::error::Fault;
-use crate::lang::value::Value;
+use pcadlang::Value;
+use pcadlang::lang::builtins::{Args, Builtin, Kind, Table};
+use pcadlang::lang::error::Fault;
 use std::sync::{Arc, LazyLock};
 
-pub(crate) static TABLE: LazyLock<Arc<Table>> = LazyLock::new(pcadlang_library::standard::table);
+static TABLE: LazyLock<Arc<Table>> = LazyLock::new(pcadlang::standard::table);
 
 /// A built-in by `module.name` or `name`.
-pub(crate) fn find(name: &str) -> &'static Builtin {
+fn find(name: &str) -> &'static Builtin {
     let (module, short) = match name.split_once('.') {
         Some((m, n)) if !m.is_empty() && !n.is_empty() => (m, n),
         _ => ("", name),
@@ -22,7 +24,7 @@ pub(crate) fn find(name: &str) -> &'static Builtin {
 }
 
 /// Calls a function with arguments by position.
-pub(crate) fn try_call(name: &str, values: &[Value]) -> Result<Value, Fault> {
+fn try_call(name: &str, values: &[Value]) -> Result<Value, Fault> {
     let builtin = find(name);
     let order = builtin.match_names(values.iter().map(|_| None)).map_err(Fault::type_error)?;
     let values: Vec<&Value> =
@@ -36,12 +38,12 @@ pub(crate) fn try_call(name: &str, values: &[Value]) -> Result<Value, Fault> {
 }
 
 /// The same, of a call that must succeed.
-pub(crate) fn call(name: &str, values: &[Value]) -> Value {
+fn call(name: &str, values: &[Value]) -> Value {
     try_call(name, values).unwrap_or_else(|f| panic!("{name}: {}", f.message))
 }
 
 /// The message, and hint if any, of a call that must fail.
-pub(crate) fn fails(name: &str, values: &[Value]) -> String {
+fn fails(name: &str, values: &[Value]) -> String {
     match try_call(name, values) {
         Ok(v) => panic!("{name} gave {v}"),
         Err(Fault { message, hint: Some(hint), .. }) => format!("{message} ({hint})"),
@@ -49,31 +51,31 @@ pub(crate) fn fails(name: &str, values: &[Value]) -> String {
     }
 }
 
-pub(crate) fn num(x: f64) -> Value {
+fn num(x: f64) -> Value {
     Value::Num(x)
 }
 
-pub(crate) fn arr(xs: &[f64]) -> Value {
+fn arr(xs: &[f64]) -> Value {
     Value::array(xs.to_vec())
 }
 
-pub(crate) fn list(xs: &[Value]) -> Value {
+fn list(xs: &[Value]) -> Value {
     Value::List(xs.to_vec().into())
 }
 
-pub(crate) fn bools(xs: &[bool]) -> Value {
+fn bools(xs: &[bool]) -> Value {
     Value::List(xs.iter().map(|b| Value::Bool(*b)).collect())
 }
 
 /// Asserts that two values are bit-identical.
 #[track_caller]
-pub(crate) fn same(got: Value, wanted: Value) {
+fn same(got: Value, wanted: Value) {
     assert!(got.same(&wanted), "got {got}, wanted {wanted}");
 }
 
 /// Asserts that a number is within a relative error of 1e-15 (absolute below 1).
 #[track_caller]
-pub(crate) fn near(got: Value, wanted: f64) {
+fn near(got: Value, wanted: f64) {
     let Value::Num(x) = got else { panic!("got {got}") };
     assert!((x - wanted).abs() <= 1e-15 * wanted.abs().max(1.0), "got {x}, wanted {wanted}");
 }
