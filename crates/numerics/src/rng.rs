@@ -4,18 +4,6 @@
 //! A stream is a function of a key (seed, chain, purpose) and a position (step, site,
 //! lane). There is no other state, so results do not depend on the order of requests or
 //! on the number of threads.
-//!
-//! ```
-//! use pcadlang_numerics::rng::{Purpose, Stream, StreamKey};
-//! // Seed, chain, purpose; then step, site, lane: equal positions give equal numbers.
-//! let key = StreamKey::new(1, 0, Purpose::KERNEL);
-//! let (mut a, mut b): (Stream, Stream) = (key.stream(7, 0, 0), key.stream(7, 0, 0));
-//! assert_eq!(a.next_u64(), b.next_u64());
-//! assert!((0.0..1.0).contains(&a.uniform()) && a.open_uniform() > 0.0 && a.standard_normal().is_finite());
-//! assert!(a.index(6) < 6 && a.weighted(&[0.0, 2.0], 2.0) == 1);
-//! assert_eq!(a.weighted_by([0.0, 2.0].into_iter(), 2.0), 1);
-//! assert_ne!(a.sample::<f64>(rand_distr::StandardUniform), b.sample::<f64>(rand_distr::StandardUniform));
-//! ```
 
 use rand::TryRng;
 use std::convert::Infallible;
