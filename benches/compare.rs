@@ -2,7 +2,7 @@
 //! comparator for a picture of a lathe and the photograph, at 128 and 512 pixels; and, at
 //! 512 pixels, every step from the file to prepared comparators.
 //!
-//!     cargo bench --bench compare -- "prepare" --quick
+//!     cargo bench -p pcadlang-benches --bench compare -- "prepare" --quick
 
 mod common;
 

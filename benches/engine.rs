@@ -1,7 +1,7 @@
 //! Benchmarks of inference steps: one transition of a regression with 10 and with 10,000
 //! points, one update of a choice on which one point among 10 to 100,000 depends, one
 //! sweep over such choices, one gradient, and one evaluation of the contour likelihood of
-//! `lathe.pcad` at 128 pixels. `cargo bench --bench engine -- update` runs the benchmarks
+//! `lathe.pcad` at 128 pixels. `cargo bench -p pcadlang-benches --bench engine -- update` runs the benchmarks
 //! with that name.
 
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -138,7 +138,7 @@ fn gradient(c: &mut Criterion) {
         ("kidscore_momiq", "a regression with 434 points"),
     ] {
         let file = |ending: &str| {
-            format!("{}/tests/posteriordb/{name}.{ending}", env!("CARGO_MANIFEST_DIR"))
+            format!("{}/../tests/posteriordb/{name}.{ending}", env!("CARGO_MANIFEST_DIR"))
         };
         let read = |ending: &str| {
             std::fs::read_to_string(file(ending)).unwrap_or_else(|e| panic!("{name}: {e}"))
@@ -182,7 +182,7 @@ fn wander(c: &mut Criterion, what: &str, trace: &mut Trace, name: &str, around: 
 }
 
 fn likelihood(c: &mut Criterion) {
-    let photograph = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/images/coffee_cup.png");
+    let photograph = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/images/coffee_cup.png");
     // `@S_L/place/t[x]` changes the pose alone, and `@H` the profile as well.
     let text = include_str!("../programs/lathe.pcad");
     let model = Program::parse(text)

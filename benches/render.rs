@@ -3,7 +3,7 @@
 //! mesh of 100,352 triangles at 64 to 512 pixels; for round lathes beside their meshes;
 //! and for a body of 22 parts (2,420 triangles), some of which move.
 //!
-//!     cargo bench --bench render -- "contours/human" --quick
+//!     cargo bench -p pcadlang-benches --bench render -- "contours/human" --quick
 
 mod common;
 

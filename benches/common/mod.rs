@@ -5,7 +5,7 @@
 #![allow(dead_code)]
 
 pub mod parts;
-#[path = "../../examples/shipped/mod.rs"]
+#[path = "../src/bin/shipped/mod.rs"]
 pub mod shipped;
 
 use criterion::Criterion;
@@ -72,7 +72,7 @@ pub fn standing(turn: f64) -> Affine {
 
 /// Returns the path of a shipped photograph.
 pub fn picture(name: &str) -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/images").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/images").join(name)
 }
 
 /// Loads the photograph of the skier at `side` by `side` pixels.

@@ -5,7 +5,7 @@ mod common;
 #[allow(dead_code)]
 #[path = "../../crates/scene/src/vision/detect/forest/writer.rs"]
 mod forests;
-#[path = "../../examples/detail_price/subjects.rs"]
+#[path = "../../benches/src/bin/detail_price/subjects.rs"]
 mod subjects;
 
 mod armature;

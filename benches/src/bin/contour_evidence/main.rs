@@ -19,6 +19,7 @@ type Score = Box<dyn FnMut(&ContourSlice<'_>) -> f64>;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("..")
         .join(std::env::args().nth(1).unwrap_or("../shared/data/objects".into()));
     let mut cases: Vec<_> =
         std::fs::read_dir(folder)?.filter_map(|e| Some(e.ok()?.path())).collect();

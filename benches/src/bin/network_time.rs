@@ -1,7 +1,7 @@
 //! Measures one run of a network on one core: median, best and worst time of 21 runs on a
 //! uniform grey picture.
 //!
-//!     cargo run --release --example network_time -- models/*.tflite
+//!     cargo run --release -p pcadlang-benches --bin network_time -- models/*.tflite
 
 use pcadlang::nn::Network;
 use std::time::Instant;

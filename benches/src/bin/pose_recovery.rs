@@ -2,7 +2,7 @@
 //! own clean contours are observed. How far are the inferred joints from the ground
 //! truth, and how often do 90 % intervals contain it?
 //!
-//! `cargo run --release --example pose_recovery -- [CASES] [SECONDS] [PARAMETER=VALUE…]`
+//! `cargo run --release -p pcadlang-benches --bin pose_recovery -- [CASES] [SECONDS] [PARAMETER=VALUE…]`
 
 mod known_truth;
 

@@ -1,7 +1,7 @@
 //! Measures one transition of a local choice as a program grows: the outlier flags of a
 //! regression, or the hidden states of a Markov chain.
 //!
-//!     cargo run --release --example transition_cost -- MODEL N TRANSITIONS [sweep]
+//!     cargo run --release -p pcadlang-benches --bin transition_cost -- MODEL N TRANSITIONS [sweep]
 //!
 //! MODEL is `linreg` or `hmm` (programs of `benches/peers`, without their plans). Choices
 //! are updated in random order or, with `sweep`, one after the other. Prints processor
@@ -80,7 +80,7 @@ fn linreg(n: usize) -> Result<Model, Box<dyn Error>> {
     let x = array(n, |i| -5.0 + 10.0 * at(i));
     let y =
         array(n, |i| if i % 10 == 3 { ((i * 31) % 41) as f64 - 20.0 } else { 7.0 - 10.0 * at(i) });
-    compile(include_str!("../benches/peers/linreg.pcad"), vec![("x", x), ("y", y)])
+    compile(include_str!("../../peers/linreg.pcad"), vec![("x", x), ("y", y)])
 }
 
 fn hmm(n: usize) -> Result<Model, Box<dyn Error>> {
@@ -89,7 +89,7 @@ fn hmm(n: usize) -> Result<Model, Box<dyn Error>> {
     let trans = Value::List(vec![row(0), row(1), row(2)].into());
     let (mu, probe) = (array(3, |i| 2.0 * i as f64 - 2.0), Value::Num((n / 2) as f64));
     compile(
-        include_str!("../benches/peers/hmm.pcad"),
+        include_str!("../../peers/hmm.pcad"),
         vec![("y", y), ("trans", trans), ("mu", mu), ("probe", probe)],
     )
 }

@@ -1,9 +1,9 @@
 //! Draws and scores a mesh in new poses, for counting instructions:
 //!
-//!     cargo build --release -p pcadlang-scene --example new_pose
-//!     valgrind --tool=callgrind target/release/examples/new_pose DATA_DIR dense 128 100
+//!     cargo build --release -p pcadlang-benches --bin new_pose
+//!     valgrind --tool=callgrind target/release/new_pose DATA_DIR dense 128 100
 //!
-//! The data are those of `render_kit` of the main package; the difference of two counts of
+//! The data are those of `render_kit`; the difference of two counts of
 //! evaluations is the cost of one. With a fifth argument each evaluation draws a copy of the
 //! mesh, as if its vertices were new.
 

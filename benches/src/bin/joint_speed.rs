@@ -1,7 +1,7 @@
 //! Measures a change of one joint of the shipped body: skinning and contours at 128
 //! pixels, for each joint, in comparison with a full redraw.
 //!
-//!     cargo run --release --example joint_speed -- [LOD [JOINT]]     (such as human.lod2 hand_l; all if left out)
+//!     cargo run --release -p pcadlang-benches --bin joint_speed -- [LOD [JOINT]]     (such as human.lod2 hand_l; all if left out)
 //!
 //! Prints medians of processor-bound wall time on one thread, alternating between full
 //! redraws and joints. Only ratios within one run are meaningful; single times depend on

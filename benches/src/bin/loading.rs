@@ -1,7 +1,7 @@
 //! Measures loading an observation at 512 x 512 pixels, stage by stage, on the two
 //! shipped photographs and on one with added noise.
 //!
-//!     cargo run --release --example loading [-- digest]
+//!     cargo run --release -p pcadlang-benches --bin loading [-- digest]
 //!
 //! Prints milliseconds of this thread's processor time and of wall time. The oriented
 //! chamfer and the contour ratio use additional threads, whose time only the wall time
@@ -58,7 +58,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{:<43} {:>8} {:>8}", "", "proc. ms", "wall ms");
     for (name, file) in [("cup", "coffee_cup.png"), ("skier", "skier.jpg"), ("noise", "skier.jpg")]
     {
-        let file = format!("{}/examples/images/{file}", env!("CARGO_MANIFEST_DIR"));
+        let file = format!("{}/../examples/images/{file}", env!("CARGO_MANIFEST_DIR"));
         let bytes = std::fs::read(file)?;
         let whole = photo::decode(&bytes, &Limits::default())?;
         let mut rgb = resize(whole.rgb(), SIDE, SIDE, FilterType::Triangle);

@@ -1,7 +1,7 @@
 //! Measures a log density with its gradient, the main cost of a leapfrog step: by a
 //! proposal and a reverse pass through the trace, and by a tape.
 //!
-//!     cargo run --release --example leapfrog_cost [-- PART_OF_A_NAME]
+//!     cargo run --release -p pcadlang-benches --bin leapfrog_cost [-- PART_OF_A_NAME]
 //!
 //! Prints processor microseconds for each.
 
@@ -57,7 +57,7 @@ fn cost(mut call: impl FnMut(usize) -> Result<(), Box<dyn Error>>) -> Result<f64
 
 /// `human.pcad` with the joints of the skier, and with a mask of them by the detector.
 fn body(joints: bool) -> Result<Model, Box<dyn Error>> {
-    let image = |name: &str| format!("{}/examples/images/{name}", env!("CARGO_MANIFEST_DIR"));
+    let image = |name: &str| format!("{}/../examples/images/{name}", env!("CARGO_MANIFEST_DIR"));
     let program = Program::open("human.pcad")?.observe_file("photo", &image("skier.jpg"))?;
     Ok(match joints {
         true => program.observe_file("points", &image("skier.keypoints.json"))?.compile()?,

@@ -1,7 +1,7 @@
 //! Measures how well candidate regions of objects of revolution are found in photographs
 //! with known masks.
 //!
-//!     cargo run --release --example candidates -- FOLDER... [most=64] [size=128]
+//!     cargo run --release -p pcadlang-benches --bin candidates -- FOLDER... [most=64] [size=128]
 //!
 //! A folder holds `image.png` and the ground truth `mask.png`. Prints for each folder the
 //! best intersection over union of the first 1, 5 and 20 candidates and of all

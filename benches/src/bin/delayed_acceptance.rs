@@ -1,7 +1,7 @@
 //! Measures the gain of delayed acceptance: effective draws per second with and without a
 //! coarse first stage, for the same posterior.
 //!
-//!     cargo run --release --example delayed_acceptance [-- DRAWS]
+//!     cargo run --release -p pcadlang-benches --bin delayed_acceptance [-- DRAWS]
 //!
 //! The pose of a known object of revolution is inferred from its own clean contours,
 //! observed by the symmetric chamfer distance at 256 and 512 pixels; the first stage

@@ -2,7 +2,7 @@
 //! own clean contours are observed. How well are pose and profile recovered, and how
 //! often do 90 % intervals contain the ground truth?
 //!
-//! `cargo run --release --example recovery -- [CASES] [SECONDS] [PARAMETER=VALUE…]`
+//! `cargo run --release -p pcadlang-benches --bin recovery -- [CASES] [SECONDS] [PARAMETER=VALUE…]`
 
 mod known_truth;
 

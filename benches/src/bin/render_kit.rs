@@ -1,7 +1,7 @@
 //! Measures the time to render and score a new pose, for the meshes and poses of a
 //! folder, in comparison with a plain rasteriser.
 //!
-//!     cargo run --release --example render_kit -- DATA_DIR [MESHES [SIZES [TASKS [PEERS]]]]     (lists with commas; all if left out)
+//!     cargo run --release -p pcadlang-benches --bin render_kit -- DATA_DIR [MESHES [SIZES [TASKS [PEERS]]]]     (lists with commas; all if left out)
 //!
 //! DATA_DIR holds `vase.bin`, `body.bin`, `dense.bin` (two u32 counts, float32 vertices,
 //! u32 triangles) and `poses.bin` (row-major 4 x 4 float32). The camera is at the origin

@@ -2,8 +2,8 @@
 //! density over time of chains with and without discriminative proposals, on one
 //! photograph.
 //!
-//!     cargo run --release --example proposals -- human.pcad examples/images/skier.jpg proposals.svg [CHAINS] [SECONDS] [CAMERA.json]
-//!     cargo run --release --example proposals -- lathe.pcad examples/images/table_lamp.png proposals.svg
+//!     cargo run --release -p pcadlang-benches --bin proposals -- human.pcad examples/images/skier.jpg proposals.svg [CHAINS] [SECONDS] [CAMERA.json]
+//!     cargo run --release -p pcadlang-benches --bin proposals -- lathe.pcad examples/images/table_lamp.png proposals.svg
 //!
 //! Both variants use the same program with the same likelihood, one chain per thread.
 //! People: with the jumps of `modes` (the time of its search counts) and without them,

@@ -1,7 +1,7 @@
 //! Measures one transition as a scene grows in which only one object is uncertain: the
 //! pose of a vase drifts among fixed boxes, spheres and lathes.
 //!
-//!     cargo run --release --example scene_cost -- [N…] [nested|flat] [front|hidden] [COMPARATOR…] [count=TRANSITIONS] [warm=TRANSITIONS] [scale=S]
+//!     cargo run --release -p pcadlang-benches --bin scene_cost -- [N…] [nested|flat] [front|hidden] [COMPARATOR…] [count=TRANSITIONS] [warm=TRANSITIONS] [scale=S]
 //!
 //! COMPARATOR is `contour` (the default), `chamfer`, `symmetric` (chamfer distance), `mask`,
 //! `depth`, `region`, `parts` (`scene.region` by parts) or `shading` (`scene.region` with

@@ -1,7 +1,7 @@
 //! Finds the candidates of pictures, for counting instructions and for comparing versions:
 //! prints for each picture a checksum of all that was found, and the time.
 //!
-//!     cargo run --release -p pcadlang-scene --features codecs --example candidate_search PICTURE …
+//!     cargo run --release -p pcadlang-benches --bin candidate_search PICTURE …
 
 use pcadlang_scene::vision::Limits;
 use pcadlang_scene::vision::candidates::{CandidateOptions, candidates};

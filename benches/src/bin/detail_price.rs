@@ -1,7 +1,7 @@
 //! Measures the savings of levels of detail and their effect on the score: triangles,
 //! time and the mean chamfer distance for several values of `detail`.
 //!
-//!     cargo run --release --example detail_price [-- POSES]
+//!     cargo run --release -p pcadlang-benches --bin detail_price [-- POSES]
 //!
 //! The subjects are a lathe of the language (a new shape each time), the shipped body in
 //! its three levels of detail (a new pose each time, skinned again) and a mesh of 100,352

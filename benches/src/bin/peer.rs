@@ -1,7 +1,7 @@
 //! Runs one model of a benchmark that compares probabilistic languages, and writes the
 //! time that it took.
 //!
-//!     cargo run --release --example peer -- DATA.json OUT.json MODEL N BUDGET_S SEED
+//!     cargo run --release -p pcadlang-benches --bin peer -- DATA.json OUT.json MODEL N BUDGET_S SEED
 //!
 //! The models are the programs in `benches/peers`; DATA holds the data sets by model (and
 //! by size, if there are several). BUDGET_S is a time in seconds, or a number of steps
@@ -24,18 +24,18 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// The models: name, program, and the names of the collected quantities.
 const MODELS: &[(&str, &str, &[&str])] = &[
-    ("coin", include_str!("../benches/peers/coin.pcad"), &["p"]),
-    ("linreg", include_str!("../benches/peers/linreg.pcad"), &["slope", "intercept", "log_noise"]),
+    ("coin", include_str!("../../peers/coin.pcad"), &["p"]),
+    ("linreg", include_str!("../../peers/linreg.pcad"), &["slope", "intercept", "log_noise"]),
     (
         "linreg_summed",
-        include_str!("../benches/peers/linreg_summed.pcad"),
+        include_str!("../../peers/linreg_summed.pcad"),
         &["slope", "intercept", "log_noise"],
     ),
-    ("hmm", include_str!("../benches/peers/hmm.pcad"), &["z"]),
-    ("gmm", include_str!("../benches/peers/gmm.pcad"), &["mu0", "mu1", "mu2"]),
-    ("schools", include_str!("../benches/peers/schools.pcad"), &["mu", "tau"]),
-    ("gp", include_str!("../benches/peers/gp.pcad"), &["log_ls", "log_amp", "log_noise"]),
-    ("tree", include_str!("../benches/peers/tree.pcad"), &["leaves"]),
+    ("hmm", include_str!("../../peers/hmm.pcad"), &["z"]),
+    ("gmm", include_str!("../../peers/gmm.pcad"), &["mu0", "mu1", "mu2"]),
+    ("schools", include_str!("../../peers/schools.pcad"), &["mu", "tau"]),
+    ("gp", include_str!("../../peers/gp.pcad"), &["log_ls", "log_amp", "log_noise"]),
+    ("tree", include_str!("../../peers/tree.pcad"), &["leaves"]),
 ];
 
 /// The draws so far: processor time (NaN if it was not read) and number of steps.

@@ -3,7 +3,7 @@
 //! between the gradient and central differences of half a pixel each way, and the cost of
 //! a gradient.
 //!
-//! `cargo run --release --example score_gradient -- [POSES] [LIKELIHOOD]`, such as
+//! `cargo run --release -p pcadlang-benches --bin score_gradient -- [POSES] [LIKELIHOOD]`, such as
 //! `200 "scene.contour(view)"`
 //!
 //! Each coordinate is scaled so that it moves its part of the surface by half a pixel in
