@@ -5,7 +5,7 @@
 //! every input that failed before.
 
 #[allow(dead_code)]
-#[path = "../../crates/command/src/studio/protocol.rs"]
+#[path = "../../crates/studio/src/protocol.rs"]
 mod protocol;
 
 use pcadlang::bank::Bank;

@@ -1,11 +1,11 @@
 //! `pcadlang contours`.
 
 use super::args::Contours;
-use super::edges;
-use super::failure::{Failure, plain};
-use super::running::files;
 use pcadlang_library::scene::DetectorValue;
 use pcadlang_report::pictures::png;
+use pcadlang_runs::edges;
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::files;
 use pcadlang_scene::vision::{FileDetector, GradientDetector};
 
 /// Detects the contours of a photograph and writes them as a map.

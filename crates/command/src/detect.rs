@@ -1,14 +1,13 @@
 //! `pcadlang detect`.
 
-use super::failure::{Failure, plain};
-use super::running::files;
 use clap::Args;
 use image::RgbImage;
-use pcadlang_detectors::people::{FindOptions, PeopleFinder, Person, json, networks};
+use pcadlang_detectors::people::{FindOptions, Person, json};
 use pcadlang_report::pictures::{DETECTED, dots, limbs, picture_size, png};
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::files;
 use pcadlang_scene::vision::Photo;
-use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// `detect`.
 #[derive(Args, Debug)]
@@ -81,16 +80,11 @@ const BONES: [(&[Bone], [f32; 3]); 3] = [
     (&[("l_shoulder", "r_shoulder"), ("l_hip", "r_hip")], [240.0, 240.0, 240.0]),
 ];
 
-/// Landmark networks in a folder, the best first.
-const LANDMARKS: [&str; 3] =
-    ["pose_landmark_heavy.tflite", "pose_landmark_full.tflite", "pose_landmark_lite.tflite"];
-const DETECTION: &str = "pose_detection.tflite";
-
 /// Detects the people in a photograph and writes their positions.
 pub fn detect(a: &Detect) -> Result<(), Failure> {
     let photo = files::photo(&a.image)?;
     let options = FindOptions { views: a.views, most: a.people as usize, ..FindOptions::default() };
-    let people = finder(a.models.as_deref())?
+    let people = pcadlang_runs::networks::finder(a.models.as_deref())?
         .find(&photo, &options, a.threads)
         .map_err(|e| plain(e.to_string()))?;
     let size = (photo.width(), photo.height());
@@ -106,42 +100,6 @@ pub fn detect(a: &Detect) -> Result<(), Failure> {
     print_line!("{}", found(&people));
     for (i, p) in people.iter().enumerate() {
         print_line!("{}", line(i + 1, p, size));
-    }
-    Ok(())
-}
-
-/// Loads the networks of a folder, or else the built-in ones.
-fn finder(folder: Option<&Path>) -> Result<PeopleFinder, Failure> {
-    let (detection, landmarks, from) = match folder {
-        None => {
-            let (detection, landmarks) = networks::files();
-            (Cow::Borrowed(detection), Cow::Borrowed(landmarks), "the program's own".to_owned())
-        }
-        Some(folder) => {
-            let best =
-                LANDMARKS.iter().map(|n| folder.join(n)).find(|p| p.exists()).ok_or_else(|| {
-                    plain(format!(
-                        "{}: none of {} was found",
-                        folder.display(),
-                        LANDMARKS.join(", ")
-                    ))
-                })?;
-            // The detection network is the same for all landmark networks.
-            let path = folder.join(DETECTION);
-            let detection = match path.exists() {
-                true => Cow::Owned(files::read(&path)?),
-                false => Cow::Borrowed(networks::files().0),
-            };
-            (detection, Cow::Owned(files::read(&best)?), folder.display().to_string())
-        }
-    };
-    PeopleFinder::new(&detection, &landmarks).map_err(|e| plain(format!("{from}: {e}")))
-}
-
-/// Makes this process detect people with the networks of a folder.
-pub fn choose(folder: Option<&Path>) -> Result<(), Failure> {
-    if let Some(folder) = folder {
-        networks::choose(finder(Some(folder))?);
     }
     Ok(())
 }

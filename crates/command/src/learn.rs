@@ -1,10 +1,10 @@
 //! `pcadlang learn`: a bank of scenes from the prior.
 
 use super::args::{FeatureKind, Learn};
-use super::failure::{Failure, plain};
-use super::running::{inputs, job, progress};
 use pcadlang_engine::lang::load::reason;
 use pcadlang_report::seconds;
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::{inputs, job, progress};
 use pcadlang_workbench::bank::{self, BankError, Features};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;

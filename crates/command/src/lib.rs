@@ -1,33 +1,28 @@
 //! The commands. Only these modules print; the library does the work.
 
-#[macro_use]
-mod print;
+#![forbid(unsafe_code)]
 
-pub mod args;
+#[macro_use]
+extern crate pcadlang_runs;
+
+mod args;
 mod contours;
 mod detect;
-mod edges;
 mod evaluate;
-mod failure;
 mod learn;
-mod lsp;
 mod manual;
-mod people;
 mod programs;
-mod reopening;
 mod repl;
-mod running;
+mod run;
 mod sample;
-mod scene;
-mod studio;
-mod term;
 mod tradeoff;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
+use pcadlang_runs::failure::plain;
+use pcadlang_runs::reopening::{compare, film, report, show};
+use pcadlang_runs::term;
 use programs::{calibrate, check, doc, fmt, predict, watch};
-use reopening::{compare, film, report, show};
-use running::run;
 use std::ffi::OsString;
 
 /// Runs the command with these arguments, the first of which is its name, and returns its exit
@@ -56,8 +51,8 @@ pub fn command(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Doc(a) => doc::doc(&a),
         Command::Repl(a) => repl::repl(&a),
         Command::Fmt(a) => fmt::fmt(&a),
-        Command::Lsp => lsp::lsp(),
-        Command::Studio(a) => studio::studio(&a),
+        Command::Lsp => pcadlang_workbench::lsp::lsp().map_err(plain),
+        Command::Studio(a) => pcadlang_studio::studio(&a),
         Command::Completions(a) => manual::completions(&a, Cli::command()),
         Command::Man(a) => manual::man(&a, Cli::command()),
         Command::Show(a) => show::show(&a),

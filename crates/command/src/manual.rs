@@ -1,8 +1,8 @@
 //! `pcadlang completions` and `pcadlang man`.
 
-use super::failure::{Failure, plain};
-use super::running::files;
 use clap::{Args, Command, ValueHint};
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::files;
 use std::io::Write;
 use std::path::PathBuf;
 

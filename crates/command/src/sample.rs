@@ -2,13 +2,13 @@
 //! et al. 2014.
 
 use super::args::Sample;
-use super::failure::{Failure, plain};
-use super::running::{files, inputs};
-use super::scene;
 use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::Trace;
 use pcadlang_report::pictures::{contact_sheet, png, shaded};
 use pcadlang_report::{number, table};
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::scene;
+use pcadlang_runs::{files, inputs};
 use std::sync::Arc;
 
 /// Draws scenes from the prior; a program without a scene gets a table of its values.

@@ -6,6 +6,7 @@
 
 pub mod bank;
 pub mod editor;
+pub mod lsp;
 pub mod score;
 pub mod session;
 pub mod tradeoff;

@@ -1,9 +1,9 @@
 //! The arguments of `repl`.
 
 use super::Allowed;
-use super::values::pair;
-use crate::running::files::program_name;
 use clap::Args;
+use pcadlang_runs::args::pair;
+use pcadlang_runs::files::program_name;
 use std::path::PathBuf;
 
 /// `repl`.

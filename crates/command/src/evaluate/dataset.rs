@@ -3,10 +3,10 @@
 //! Invariant: no other files of a dataset are opened. Ground truth beside the pictures,
 //! or in other fields of `annotations.json`, cannot reach a run.
 
-use crate::failure::{Failure, plain};
-use crate::running::files;
 use pcadlang_engine::lang::load::reason;
 use pcadlang_report::evaluation::{MARK, PREDICTIONS, TABLE};
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::files;
 use serde::Deserialize;
 use std::collections::HashSet;
 use std::path::{Component, Path, PathBuf};

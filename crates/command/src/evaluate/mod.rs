@@ -8,10 +8,6 @@ mod dataset;
 mod observed;
 
 use super::args::{Evaluate, Inputs, Job};
-use super::failure::{Failure, plain};
-use super::running::job::{CHECKPOINT, Interrupt, RunMode};
-use super::running::{inputs, job, quality, ready, resume};
-use super::{edges, term};
 use dataset::Case;
 pub use dataset::{Dataset, Layout, known};
 pub use observed::{Detections, Items, observations_for};
@@ -19,6 +15,10 @@ use pcadlang_report::evaluation::{
     EvaluationDir, MARK, PREDICTIONS, Row, TABLE, markdown, prediction,
 };
 use pcadlang_report::{RunDir, bytes_hash, r_hat_text, seconds};
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::job::{CHECKPOINT, Interrupt, RunMode};
+use pcadlang_runs::{edges, term};
+use pcadlang_runs::{inputs, job, quality, ready, resume};
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 use std::time::Instant;

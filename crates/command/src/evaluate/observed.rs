@@ -1,9 +1,9 @@
 //! The observations of a case, as arguments of `--observe`.
 
 use super::dataset::Case;
-use crate::failure::{Failure, plain};
-use crate::running::files;
 use pcadlang_library::Program;
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::files;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 

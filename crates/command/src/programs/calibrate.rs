@@ -3,11 +3,6 @@
 //! module runs them and prints the results.
 
 use crate::args::{Check, Inputs, Job, Sampling};
-use crate::failure::{Failure, plain};
-use crate::people::PersonArgs;
-use crate::running::inputs;
-use crate::running::job::{Interrupt, machine_threads};
-use crate::running::progress::{self, Ending};
 use pcadlang_inference as infer;
 use pcadlang_inference::calibration::{
     CalibrationError, FALSE_ALARMS, Geweke, PlanSampler, RANKS, Sampler, Sbc, Settings, geweke, sbc,
@@ -15,6 +10,11 @@ use pcadlang_inference::calibration::{
 use pcadlang_inference::{Progress, RunOptions};
 use pcadlang_library::Model;
 use pcadlang_report::{number, seconds, table};
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::inputs;
+use pcadlang_runs::job::{Interrupt, machine_threads};
+use pcadlang_runs::people::PersonArgs;
+use pcadlang_runs::progress::{self, Ending};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;

@@ -1,9 +1,9 @@
 //! `pcadlang check`.
 
 use crate::args::Check;
-use crate::failure::Failure;
-use crate::term::has_colors;
 use pcadlang_library::Program;
+use pcadlang_runs::failure::Failure;
+use pcadlang_runs::term::has_colors;
 use pcadlang_syntax::diag::render;
 
 /// Checks each program, and lists its params and the data that it needs.
@@ -45,7 +45,7 @@ pub fn check(a: &Check) -> Result<(), Failure> {
     if failed.is_empty() {
         Ok(())
     } else {
-        Err(crate::failure::plain(format!(
+        Err(pcadlang_runs::failure::plain(format!(
             "{} of {} programs have mistakes: {}",
             failed.len(),
             a.programs.len(),

@@ -1,10 +1,10 @@
 //! `pcadlang doc`.
 
 use crate::args::Doc;
-use crate::failure::{Failure, plain};
 use pcadlang_engine::lang::builtins::search::search;
 use pcadlang_engine::lang::builtins::{Table, doc as docs};
 use pcadlang_library::standard;
+use pcadlang_runs::failure::{Failure, plain};
 
 /// Prints documentation from the table of built-ins.
 pub fn doc(a: &Doc) -> Result<(), Failure> {

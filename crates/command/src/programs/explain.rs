@@ -3,12 +3,12 @@
 //! What one proposal draws is measured: a choice of each group is proposed in the last
 //! state of the first chain, and the proposal is then undone.
 
-use crate::running::job::Outcome;
 use pcadlang_engine::trace::{Draws, Target, Trace};
 use pcadlang_inference::selecting;
 use pcadlang_library::Model;
 use pcadlang_numerics::rng::{Purpose, StreamKey};
 use pcadlang_report::table::{COLUMNS, aligned};
+use pcadlang_runs::job::Outcome;
 use pcadlang_scene::render::{Work, work};
 use pcadlang_syntax::span::{FileId, Span};
 use serde_json::{Value, json};

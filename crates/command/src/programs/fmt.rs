@@ -1,11 +1,11 @@
 //! `pcadlang fmt`.
 
 use crate::args::Fmt;
-use crate::failure::{Failure, plain};
-use crate::running::files;
-use crate::term::has_colors;
 use pcadlang_engine::lang::load::reason;
 use pcadlang_report::write_file;
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::files;
+use pcadlang_runs::term::has_colors;
 use pcadlang_syntax::diag::{IntoDiagnostic, SourceMap, render};
 use pcadlang_syntax::format;
 use std::io::{Read, Write};

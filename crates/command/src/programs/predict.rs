@@ -3,12 +3,6 @@
 //! module makes a table and a file.
 
 use crate::args::{Job, Predict};
-use crate::failure::{Failure, plain};
-use crate::running::files::write_in;
-use crate::running::job::{self, Interrupt};
-use crate::running::progress::{self, Ending};
-use crate::running::quality;
-use crate::running::ready::{self, Ready};
 use pcadlang_inference::draws::{Discard, Sink};
 use pcadlang_inference::predictive::{
     Predictive, Replication, STATISTICS, observed, prior, statistics, tail,
@@ -16,6 +10,12 @@ use pcadlang_inference::predictive::{
 use pcadlang_inference::{Progress, diagnostics};
 use pcadlang_library::Model;
 use pcadlang_report::{RunDir, number, seconds, table};
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::files::write_in;
+use pcadlang_runs::job::{self, Interrupt};
+use pcadlang_runs::progress::{self, Ending};
+use pcadlang_runs::quality;
+use pcadlang_runs::ready::{self, Ready};
 use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;

@@ -1,13 +1,13 @@
 //! `pcadlang check --watch`.
 
 use crate::args::Check;
-use crate::failure::Failure;
 use crate::programs::check;
-use crate::running::job::Interrupt;
-use crate::term;
 use pcadlang_engine::lang::load::{Loader, Shipped, load};
 use pcadlang_engine::lang::reach::Reach;
 use pcadlang_library::shipped;
+use pcadlang_runs::failure::Failure;
+use pcadlang_runs::job::Interrupt;
+use pcadlang_runs::term;
 use pcadlang_syntax::diag::SourceMap;
 use std::collections::BTreeMap;
 use std::io::{self, IsTerminal};

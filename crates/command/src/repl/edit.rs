@@ -1,6 +1,6 @@
 //! `:edit`: the program in the user's own editor.
 
-use crate::failure::{Failure, plain};
+use pcadlang_runs::failure::{Failure, plain};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

@@ -2,11 +2,11 @@
 
 use super::super::args::Graphics;
 use super::{blocks, iterm, kitty, sixel};
-use crate::failure::{Failure, plain};
-use crate::running::files;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use pcadlang_report::pictures::png;
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::files;
 use pcadlang_workbench::session::Picture;
 use std::path::{Path, PathBuf};
 

@@ -6,9 +6,9 @@
 use super::truth::{self, Truth};
 use crate::args::Tradeoff;
 use crate::evaluate::{Dataset, Detections, Items, Layout, observations_for};
-use crate::failure::{Failure, plain};
-use crate::running::{files, inputs};
 use pcadlang_library::Program;
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::{files, inputs};
 use std::path::{Path, PathBuf};
 
 /// A case.

@@ -3,8 +3,8 @@
 //!
 //! Invariant: every run in the journal is complete; all other files are rebuilt from it.
 
-use crate::failure::{Failure, plain};
 use pcadlang_report::write_file;
+use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_workbench::tradeoff::RunRecord;
 use serde_json::{Map, Value};
 use std::fs::File;

@@ -14,12 +14,12 @@ mod work;
 
 use super::args::Tradeoff;
 use super::evaluate::known;
-use super::failure::{Failure, plain};
-use super::running::inputs;
-use super::running::job::{self, Interrupt};
 use cases::Case;
 use folder::Folder;
 use pcadlang_report::{bytes_hash, seconds, text_hash};
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::inputs;
+use pcadlang_runs::job::{self, Interrupt};
 use pcadlang_workbench::tradeoff::{
     Preset, Presets, Quality, Round, Row, RunRecord, Setting, plot, rounds, rows, survivors, to_csv,
 };

@@ -1,9 +1,9 @@
 //! The settings to try, and their programs.
 
 use crate::args::{Inputs, Tradeoff};
-use crate::failure::{Failure, plain};
-use crate::running::inputs;
 use pcadlang_library::shipped;
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::inputs;
 use pcadlang_workbench::tradeoff::{Plan, Setting};
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -60,7 +60,7 @@ pub fn programs(a: &Tradeoff, settings: &[Setting]) -> Result<Map<String, Value>
 /// own, `NAME.settings.json`.
 fn files(a: &Tradeoff) -> Result<Vec<(String, String)>, Failure> {
     let named = a.settings.iter().map(|path| {
-        let text = String::from_utf8(crate::running::files::read(path)?)
+        let text = String::from_utf8(pcadlang_runs::files::read(path)?)
             .map_err(|_| plain(format!("{}: not text", path.display())))?;
         Ok((path.display().to_string(), text))
     });

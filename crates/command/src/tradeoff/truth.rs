@@ -1,8 +1,8 @@
 //! Reads ground truth.
 
-use crate::failure::{Failure, plain};
-use crate::running::files;
 use indexmap::IndexMap;
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::files;
 use pcadlang_scene::render::{Camera, Projection};
 use pcadlang_scene::vision::npy::{self, NpyArray};
 use pcadlang_workbench::score::{JointsTruth, Normal, Reference, Surface, SurfaceTruth};

@@ -1,0 +1,136 @@
+//! `pcadlang run`: one run, its folder, and the summary printed at the end.
+
+use crate::args::{Job, Live, Run};
+use crate::programs::explain::{Explanation, explain};
+use pcadlang_report::{RunDir, modes_table, seconds, table};
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::files::write_in;
+use pcadlang_runs::job::{self, Interrupt, Outcome, RunMode};
+use pcadlang_runs::print::paragraph;
+use pcadlang_runs::{quality, ready, resume};
+use serde_json::json;
+use std::path::Path;
+
+/// Runs a program and writes its folder.
+pub fn run(a: &Run) -> Result<(), Failure> {
+    let job = &quality::filled(&a.job, a.quiet)?;
+    let ready = ready::prepare(job, a.quiet)?;
+    let (_, default_plan) = ready.model.plan()?;
+    if let (Some(text), false) = (&default_plan, a.quiet) {
+        error_line!(
+            "note: the program has no `infer` block; using this default plan, which you can copy and edit:\n{text}"
+        );
+    }
+    a.live.iter().try_for_each(Live::check)?;
+    let interrupt = Interrupt::listen();
+    let record = job::record(job, ready.model.hash(), &job::inputs_hash(job, &ready.model)?);
+    let (runs, name) = (Path::new("runs"), job::stem(&job.inputs.program));
+    if let Some(path) =
+        a.out.as_ref().filter(|path| !a.resume && !a.quiet && resume::left(path).is_some())
+    {
+        error_line!("note: replacing the earlier run in {}", path.display());
+    }
+    let dir = match &a.out {
+        Some(path) if a.resume => resume::resumed(path, &record)?,
+        None if a.resume => resume::resumed(&RunDir::latest(runs, name), &record)?,
+        Some(path) => RunDir::create(path).map_err(|e| plain(e.to_string()))?,
+        None => RunDir::fresh(runs, name).map_err(|e| plain(e.to_string()))?,
+    };
+    let manner = RunMode {
+        live: !(a.quiet || a.json || a.stream),
+        checkpoint: a.checkpoint,
+        resume: a.resume,
+        keep: a.keep,
+        follow: a.live.clone(),
+        stream: a.stream,
+    };
+    let outcome = job::perform(job, &ready, &dir, &record, &interrupt, manner)?;
+    let explained = a.explain.then(|| explain(&ready.model, &outcome, job.sampling.seed));
+    if let Some(explained) = &explained {
+        let text = serde_json::to_vec_pretty(&explained.json()).unwrap_or_default();
+        write_in(&dir, "explained.json", &text)?;
+    }
+    show(a, job, &dir, &outcome, explained.as_ref());
+    if outcome.interrupted { Err(Failure::Interrupted) } else { Ok(()) }
+}
+
+/// Prints the results at the end of a run.
+fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explanation>) {
+    let seed = job.sampling.seed;
+    if a.json {
+        let all = job::summaries(&o.quantities, o.kernel_seconds());
+        let mut said = json!({
+            "out": dir.path(), "seed": seed, "quantities": all, "kernels": o.kernels, "choices": o.sites,
+            "modes": o.modes,
+            "warnings": o.warnings,
+            "approximate": o.approximate,
+        });
+        if let Some(explained) = explained {
+            said["explained"] = explained.json();
+        }
+        print_line!("{said}");
+        return;
+    }
+    if a.quiet || a.stream {
+        return;
+    }
+    let modes = modes_table(&o.modes, &o.quantities);
+    let gap = if modes.is_empty() { "" } else { "\n" };
+    let quantities = table::quantities(&o.quantities, o.kernel_seconds());
+    print_text!("{quantities}{gap}{modes}\n{}", table::kernels(&o.kernels));
+    let sites = table::sites(&o.sites);
+    if !sites.is_empty() {
+        print_text!("\n{sites}");
+    }
+    if let Some(explained) = explained {
+        print_text!("\n{}\n", explained.text());
+    }
+    for w in &o.warnings {
+        paragraph(&format!("warning: {w}"));
+    }
+    match &o.approximate[..] {
+        [] => {}
+        all if a.verbose => all.iter().for_each(|a| paragraph(&format!("approximate: {a}"))),
+        [one] => paragraph(&format!("approximate: {one}")),
+        all => print_line!(
+            "approximate: {} approximations, listed in the report and with --verbose",
+            all.len()
+        ),
+    }
+    if o.chains.first().is_some_and(|c| c.last.is_pseudo()) {
+        paragraph(
+            "note: the image score is not a normalised likelihood: the widths of intervals depend on \
+             its scale (a pseudo-posterior)",
+        );
+    }
+    if o.every > 1 {
+        print_line!(
+            "note: the summary is thinned to one draw in {}; the chain files have all draws",
+            o.every
+        );
+    }
+    let steps: u64 = o.chains.iter().map(|c| c.steps + c.warmup).sum();
+    let most = o.chains.iter().map(|c| (c.steps, c.warmup)).max().unwrap_or_default();
+    print_line!("seed {seed}, {} chains, {steps} steps in {}", o.chains.len(), seconds(o.seconds));
+    if job.sampling.time.is_some() {
+        print_line!(
+            "to repeat the longest chain: --steps {} --warmup {}{}",
+            most.0,
+            most.1,
+            quality::again(job)
+        );
+    }
+    if o.interrupted {
+        print_line!(
+            "interrupted: all draws so far are kept; to resume, repeat the command with --resume --out {}",
+            shown(dir)
+        );
+    }
+    print_line!("{}", dir.path().display());
+}
+
+/// Quotes a folder for the command line if necessary.
+fn shown(dir: &RunDir) -> String {
+    let path = dir.path().display().to_string();
+    if path.contains(char::is_whitespace) { format!("'{path}'") } else { path }
+}

@@ -1,0 +1,572 @@
+//! One run, from its program to its folder, for `run` and `evaluate`. Only the progress
+//! line is printed here.
+//!
+//! Invariant: `run.json` has the state `done` only when all other files of the folder are
+//! complete.
+
+use crate::args::{Job, Live};
+use crate::best::{disagreement, keep_best, outside, show_best};
+use crate::embedded::write_scene;
+use crate::failure::{Failure, plain};
+use crate::files::write_in;
+use crate::keypoints::{Joints, coco};
+use crate::places::{best_of_each, show_places};
+use crate::progress::{self, Ending};
+use crate::ready::Ready;
+use crate::reopening::page::write_page;
+use crate::reopening::reopened::{PROGRAM, TRACES, TRAJECTORY, arguments};
+use crate::reopening::{date, seen};
+use crate::stream::Streamed;
+use crate::watched::Watched;
+use crate::{edges, people};
+use crate::{files, inputs};
+use pcadlang_inference::RunOptions;
+use pcadlang_inference::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
+use pcadlang_inference::{
+    BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Progress, Trajectory,
+    stuck_structure,
+};
+use pcadlang_library::Model;
+use pcadlang_report::{
+    ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, modes, quantities,
+    table, text_hash, widen, zarr,
+};
+use pcadlang_workbench::bank::BankFiles;
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::time::Duration;
+
+/// The results of a run.
+pub struct Outcome {
+    /// Every recorded quantity.
+    pub quantities: Vec<Quantity>,
+    /// Statistics of the kernels, over all chains.
+    pub kernels: Vec<KernelStats>,
+    /// Statistics of single-site kernels by address, over all chains.
+    pub sites: Vec<SiteStats>,
+    /// The modes that the chains are in, if there are several.
+    pub modes: Vec<Mode>,
+    /// Warnings, for example of quantities that have not converged.
+    pub warnings: Vec<String>,
+    /// Approximations, apart from floating-point rounding and the finite number of draws.
+    pub approximate: Vec<String>,
+    /// The chains.
+    pub chains: Vec<ChainResult>,
+    /// The summary uses every n-th draw; n is 1 unless there are more draws than fit in
+    /// memory.
+    pub every: u64,
+    /// Wall time until everything except the page was written.
+    pub seconds: f64,
+    /// Whether the user interrupted the run.
+    pub interrupted: bool,
+}
+
+impl Outcome {
+    /// Returns the time of all kernels after warm-up, over all chains, in seconds.
+    pub fn kernel_seconds(&self) -> f64 {
+        kernel_seconds(&self.kernels)
+    }
+}
+
+fn kernel_seconds(kernels: &[KernelStats]) -> f64 {
+    kernels.iter().map(|k| k.seconds).sum()
+}
+
+/// Returns the summary of each quantity, with its effective sample size per second of
+/// kernel time.
+pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
+    let one = |q: &Quantity| {
+        let mut s = json!(q.summary);
+        if let Some(reason) = q.why_no_r_hat() {
+            s["r_hat_reason"] = json!(reason);
+        }
+        s["ess_per_second"] = json!(table::per_second(q.summary.ess_bulk, seconds));
+        (q.name.clone(), s)
+    };
+    quantities.iter().map(one).collect()
+}
+
+/// Ctrl-C, which ends all current runs.
+#[derive(Default)]
+pub struct Interrupt {
+    asked: AtomicBool,
+    runs: Mutex<Vec<Weak<Progress>>>,
+}
+
+impl Interrupt {
+    /// Handles Ctrl-C from now on, until the command ends.
+    pub fn listen() -> Arc<Interrupt> {
+        let interrupt = Arc::new(Interrupt::default());
+        let heard = Arc::clone(&interrupt);
+        // If no handler can be set, the system's default stays. A second Ctrl-C exits
+        // without waiting for the end of the step; the files on the disk are complete
+        // then.
+        let _ = ctrlc::set_handler(move || {
+            if heard.asked.swap(true, Ordering::SeqCst) {
+                std::process::exit(130);
+            }
+            heard.pass_on();
+        });
+        interrupt
+    }
+
+    /// Returns whether the user has interrupted the command.
+    pub fn asked(&self) -> bool {
+        self.asked.load(Ordering::SeqCst)
+    }
+
+    /// Makes a run end at its next step after an interrupt, or at once if there was one
+    /// already.
+    pub fn ends(&self, run: &Arc<Progress>) {
+        let mut runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
+        runs.retain(|r| r.strong_count() > 0);
+        runs.push(Arc::downgrade(run));
+        drop(runs);
+        if self.asked() {
+            self.pass_on();
+        }
+    }
+
+    fn pass_on(&self) {
+        let runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
+        for run in runs.iter().filter_map(Weak::upgrade) {
+            run.cancelled.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Hashes the files named on the command line, and those that the program reads itself.
+///
+/// # Errors
+/// If a file no longer exists.
+pub fn inputs_hash(job: &Job, model: &Model) -> Result<String, Failure> {
+    let mut all = model.data_hash().to_owned();
+    let named = job
+        .observe
+        .iter()
+        .map(|o| inputs::file_of(o))
+        .chain(job.keypoints.as_deref().map(inputs::file_of));
+    let plain = [&job.observe_contours, &job.inputs.camera].into_iter().flatten();
+    for path in named.map(Path::new).chain(plain.map(|p| p.as_path())) {
+        all.push_str(&bytes_hash(&files::read(path)?));
+    }
+    if job.inputs.edges.is_some() {
+        all.push_str(&bytes_hash(&edges::bytes(job.inputs.edges.as_deref())?));
+    }
+    Ok(text_hash(&all))
+}
+
+/// Returns the folder of a program.
+fn folder(program: &str) -> &Path {
+    Path::new(program).parent().unwrap_or(Path::new(""))
+}
+
+/// Returns the name of a program without folder and extension; `stdin` for the standard input.
+pub fn stem(path: &str) -> &str {
+    if path == inputs::STDIN {
+        return "stdin";
+    }
+    Path::new(path).file_stem().and_then(|s| s.to_str()).unwrap_or("run")
+}
+
+/// Returns the number of threads of a run.
+pub fn threads(job: &Job) -> usize {
+    job.sampling.threads.map_or_else(machine_threads, |n| n as usize)
+}
+
+/// Returns the number of hardware threads.
+pub fn machine_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// Makes the record of a run for `run.json` before it begins, with everything that its
+/// draws depend on.
+pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value> {
+    let s = &job.sampling;
+    let record = json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "state": "running",
+        "begun": date::now(),
+        "program": job.inputs.program,
+        "program_hash": program_hash,
+        "inputs_hash": inputs,
+        "seed": s.seed,
+        "arguments": arguments(job),
+        "observe": observed(job).collect::<Vec<_>>(),
+        "set": job.inputs.sets.iter().map(|(k, v)| (k.clone(), json!(v))).collect::<Map<_, _>>(),
+        "settings": {
+            "chains": s.chains(), "steps": s.steps, "warmup": s.warmup,
+            "time": s.time.map(|t| t.as_secs_f64()), "incremental": !s.no_incremental,
+        },
+    });
+    match record {
+        Value::Object(mut record) => {
+            record.extend(job.inputs.edges.iter().map(|e| ("edges".to_owned(), json!(e))));
+            record
+        }
+        _ => Map::new(),
+    }
+}
+
+/// Writes `run.json`: the record, the state, and more fields.
+pub fn write_record(
+    dir: &RunDir,
+    record: &Map<String, Value>,
+    state: &str,
+    more: Value,
+) -> Result<(), Failure> {
+    write_run(dir, &recorded(record, state, more))
+}
+
+/// Adds the state and more fields to a record.
+fn recorded(record: &Map<String, Value>, state: &str, more: Value) -> Value {
+    let mut record = record.clone();
+    record.insert("state".into(), json!(state));
+    if let Value::Object(more) = more {
+        record.extend(more);
+    }
+    Value::Object(record)
+}
+
+fn write_run(dir: &RunDir, run: &Value) -> Result<(), Failure> {
+    write_in(dir, "run.json", &serde_json::to_vec_pretty(run).unwrap_or_default())
+}
+
+/// Records in `run.json` that a run failed, and why.
+pub fn record_failure(
+    dir: &RunDir,
+    record: &Map<String, Value>,
+    failure: &Failure,
+    seconds: f64,
+) -> Result<(), Failure> {
+    write_record(dir, record, "failed", json!({ "error": failure.to_string(), "seconds": seconds }))
+}
+
+/// The default time between checkpoints.
+pub const CHECKPOINT: Duration = Duration::from_secs(10);
+
+/// How a run is carried out; its draws do not depend on this.
+#[derive(Clone, Debug)]
+pub struct RunMode {
+    /// Whether progress is shown.
+    pub live: bool,
+    /// The time between checkpoints.
+    pub checkpoint: Duration,
+    /// Whether to resume the run in the folder.
+    pub resume: bool,
+    /// How many complete states are kept.
+    pub keep: u32,
+    /// Where the best state is sent as it improves.
+    pub follow: Option<Live>,
+    /// Whether draws are printed as they are made.
+    pub stream: bool,
+}
+
+/// Runs the chains and fills the folder. A failure is recorded in the folder, too.
+pub fn perform(
+    job: &Job,
+    ready: &Ready,
+    dir: &RunDir,
+    record: &Map<String, Value>,
+    interrupt: &Interrupt,
+    manner: RunMode,
+) -> Result<Outcome, Failure> {
+    let watched = Watched::new(job, &ready.model, manner.keep);
+    perform_watched(job, ready, dir, record, interrupt, manner, &watched)
+}
+
+/// [`perform`] with something to look at meanwhile, made for the same job.
+pub fn perform_watched(
+    job: &Job,
+    ready: &Ready,
+    dir: &RunDir,
+    record: &Map<String, Value>,
+    interrupt: &Interrupt,
+    manner: RunMode,
+    watched: &Watched,
+) -> Result<Outcome, Failure> {
+    write_record(dir, record, "running", json!({}))?;
+    write_in(dir, PROGRAM, ready.model.text().as_bytes())?;
+    fill(job, ready, dir, record, interrupt, manner, watched).inspect_err(|failure| {
+        // An error in writing the record must not hide the first error.
+        let _ = record_failure(dir, record, failure, ready.begun.elapsed().as_secs_f64());
+    })
+}
+
+/// Returns the options of a job's chains.
+pub fn options(job: &Job, ready: &Ready, callback: Option<Arc<dyn Callback>>) -> RunOptions {
+    let (s, model) = (&job.sampling, &ready.model);
+    RunOptions {
+        seed: s.seed,
+        steps: s.steps,
+        warmup: s.warmup,
+        // The time left after compilation.
+        time: s.time.map(|t| t.saturating_sub(ready.begun.elapsed())),
+        incremental: !s.no_incremental,
+        limits: model.limits().clone(),
+        callback,
+        banks: Some(Arc::new(BankFiles::new(
+            model,
+            folder(&job.inputs.program),
+            job.features_from.clone(),
+        ))),
+        sites: true,
+        pointwise: true,
+        first_chain: 0,
+    }
+}
+
+fn fill(
+    job: &Job,
+    ready: &Ready,
+    dir: &RunDir,
+    record: &Map<String, Value>,
+    interrupt: &Interrupt,
+    manner: RunMode,
+    watched: &Watched,
+) -> Result<Outcome, Failure> {
+    let Ready { model, named_image: image, begun, chooses } = ready;
+    let s = &job.sampling;
+    let joints = Joints::new(s.chains(), ready.size());
+    let Watched { progress, best, kept, trajectory, memories } = watched;
+    // A single chain has one mode, which needs no evidence.
+    let evidence = Arc::new(Evidence::new(if s.chains() > 1 { s.chains() } else { 0 }));
+    let callbacks: Vec<Arc<dyn Callback>> = vec![
+        Arc::new(joints.clone()),
+        best.clone(),
+        evidence.clone(),
+        kept.clone(),
+        trajectory.clone(),
+    ];
+    let options = options(job, ready, Some(Arc::new(Callbacks::from_iter(callbacks))));
+    if manner.resume {
+        let lines = std::fs::read_to_string(dir.file(TRAJECTORY)).unwrap_or_default();
+        let states = lines.lines().filter_map(|line| serde_json::from_str(line).ok());
+        trajectory.restore(states.collect());
+    }
+    let sinks = sinks(dir, job, model, memories, record, &manner)?;
+    let ending = Ending::default();
+    interrupt.ends(progress);
+    let results = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            progress::watch(progress, (s.chains(), "chains"), &ending, options.time, !manner.live)
+        });
+        scope.spawn(|| progress::ask_for_checkpoints(progress, &ending, manner.checkpoint));
+        scope.spawn(|| keep_best(dir, model, best, &ending, manner.checkpoint));
+        scope.spawn(|| keep_states(dir, kept, trajectory, &ending, manner.checkpoint));
+        scope.spawn(|| manner.follow.iter().for_each(|l| l.follow(ready, watched, &ending)));
+        ending.of(|| model.run_into(&options, threads(job), progress, sinks))
+    })?;
+    let interrupted = progress.cancelled.load(Ordering::Relaxed);
+    let sampled = begun.elapsed().as_secs_f64();
+
+    let chains =
+        results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| model.chain_error(e))?;
+    write_traces(dir, kept)?;
+    write_lines(dir, TRAJECTORY, &trajectory.all())?;
+    let mut draws: Vec<ChainDraws> = memories.iter().map(Memory::draws).collect();
+    // A run that may be resumed keeps all its draws.
+    let even = align(dir.path(), s.chains(), !interrupted);
+    let even =
+        even.map_err(|e| plain(format!("{}: {e}; its draws are kept", dir.path().display())))?;
+    if let Some(even) = even {
+        draws.iter_mut().for_each(|d| d.rows.retain(|r| r.draw < even));
+    }
+    widen(&mut draws);
+    let points = chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
+    let step_sizes: Vec<_> =
+        chains.iter().map(|c| c.kernels.iter().find_map(|k| k.step_size)).collect();
+    let zarr = zarr::write(dir.path(), &draws, &step_sizes, &points);
+    zarr.map_err(|e| {
+        plain(format!("{}: {e}; earlier output is kept", dir.file(zarr::ZARR).display()))
+    })?;
+    let quantities = quantities(&draws);
+    let every = draws.iter().map(|d| d.every).max().unwrap_or(1);
+    let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
+    let modes = modes(&quantities, Some(&evidence));
+    let mut warnings = pcadlang_report::warnings(&quantities, &modes, &kernels, chains.len());
+    let person = job.inputs.who.person.unwrap_or(1);
+    if *chooses {
+        warnings
+            .extend(image.iter().flat_map(|(name, image)| people::warnings(name, image, person)));
+    }
+    let approximate = approximate(job, &chains);
+    let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
+    warnings.extend(chains.first().and_then(|c| structure_warning(&c.last, &sites)));
+    let inputs = image.as_ref().map(|(name, _)| name.as_str()).zip(ready.image());
+    let located = chains.first().map_or_else(Vec::new, |c| c.last.located());
+    warnings.extend(seen::warnings(inputs, job.keypoints.as_deref(), &located));
+    let places = best_of_each(&modes, best);
+    let best = best.state();
+    let drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, ready.image())?;
+    show_places(dir, s.seed, model, &places, ready.photo())?;
+    let log_joint = best.as_ref().map_or(f64::NAN, |b| b.log_joint);
+    write_scene(dir, s.seed, ready, (log_joint, &drawn), &kept.all())?;
+    warnings.extend(disagreement(&drawn));
+    warnings.extend(outside(&drawn));
+    let summary = json!({
+        "quantities": summaries(&quantities, kernel_seconds(&kernels)), "kernels": kernels, "choices": sites,
+        "modes": modes, "warnings": warnings, "approximate": approximate, "every": every,
+    });
+    write_in(dir, "summary.json", &serde_json::to_vec_pretty(&summary).unwrap_or_default())?;
+    let elapsed = begun.elapsed().as_secs_f64();
+    if let Some(found) = drawn.view.as_ref().and_then(|v| joints.report(v, &modes, elapsed)) {
+        write_in(dir, "keypoints.json", &serde_json::to_vec_pretty(&found).unwrap_or_default())?;
+        let picture = job.observe.first().map_or("", |o| stem(inputs::file_of(o)));
+        if let Some(coco) = coco(&found, picture) {
+            write_in(dir, "keypoints.coco.json", coco.to_string().as_bytes())?;
+        }
+    }
+    let mut more = counts(&chains, best.as_deref(), &quantities);
+    more.extend(drawn.agreement.map(|a| ("agreement".into(), json!(a))));
+    more.extend([("sampling_seconds".into(), json!(sampled)), ("seconds".into(), json!(elapsed))]);
+    let run =
+        recorded(record, if interrupted { "interrupted" } else { "done" }, Value::Object(more));
+    write_page(dir, &run, &summary, &quantities)?;
+    write_run(dir, &run)?;
+    Ok(Outcome {
+        quantities,
+        kernels,
+        sites,
+        modes,
+        warnings,
+        approximate,
+        chains,
+        every,
+        seconds: elapsed,
+        interrupted,
+    })
+}
+
+/// Warns of choices that determine which others exist, and hardly ever move.
+fn structure_warning(state: &pcadlang_engine::trace::Trace, sites: &[SiteStats]) -> Option<String> {
+    let stuck = stuck_structure(state, sites);
+    let (address, rate) = stuck.first()?;
+    let more =
+        if stuck.len() > 1 { format!(" (and {} others)", stuck.len() - 1) } else { String::new() };
+    Some(format!(
+        "{address}{more} decides which other choices exist, and {:.1}% of its proposals were accepted, so \
+         the number of components hardly changes; marginalise their labels, as in `observe mixture(map(fn(m) {{ 1 / k }}, mu), \
+         map(fn(m) {{ normal(m, sd) }}, mu)) = ys;` (guide, chapter 7)",
+        100.0 * rate
+    ))
+}
+
+/// Writes the states kept so far, one per line, at intervals until the chains end.
+fn keep_states(
+    dir: &RunDir,
+    kept: &KeptTraces,
+    trajectory: &Trajectory,
+    ending: &Ending,
+    every: Duration,
+) {
+    let mut written = 0;
+    while !ending.within(every) {
+        // Errors are reported at the end of the run.
+        let _ = write_traces(dir, kept);
+        let count = trajectory.count();
+        if count != written {
+            written = count;
+            let _ = write_lines(dir, TRAJECTORY, &trajectory.all());
+        }
+    }
+}
+
+fn write_traces(dir: &RunDir, kept: &KeptTraces) -> Result<(), Failure> {
+    write_lines(dir, TRACES, &kept.all())
+}
+
+/// Writes states as JSON, one per line.
+fn write_lines(dir: &RunDir, name: &str, states: &[impl Serialize]) -> Result<(), Failure> {
+    let lines = states
+        .iter()
+        .filter_map(|k| serde_json::to_string(k).ok())
+        .fold(String::new(), |s, k| s + &k + "\n");
+    if lines.is_empty() { Ok(()) } else { write_in(dir, name, lines.as_bytes()) }
+}
+
+/// Lists the approximations of a run, in its likelihoods and by its time limit.
+fn approximate(job: &Job, chains: &[ChainResult]) -> Vec<String> {
+    let mut all = chains.first().map_or_else(Vec::new, |c| c.last.approximations());
+    if job.sampling.time.is_some() {
+        all.push("the time limit: the number of steps taken depends on the machine".into());
+    }
+    all
+}
+
+/// Returns the statistics of the chains for `run.json`.
+fn counts(
+    chains: &[ChainResult],
+    best: Option<&BestState>,
+    quantities: &[Quantity],
+) -> Map<String, Value> {
+    let each: Vec<Value> = chains
+        .iter()
+        .map(|c| json!({ "steps": c.steps, "warmup": c.warmup, "draws": c.draws, "seconds": c.seconds }))
+        .collect();
+    let best = best.map(|b| b.log_joint);
+    let r_hat =
+        quantities.iter().map(|q| q.summary.r_hat).filter(|r| !r.is_nan()).max_by(f64::total_cmp);
+    // R-hat is undefined if chains are stuck at different values, and the maximum over
+    // other quantities would be misleading.
+    let stuck = quantities.iter().find(|q| q.is_stuck());
+    let r_hat = if stuck.is_some() { None } else { r_hat };
+    let mut all =
+        vec![("chains", json!(each)), ("best_log_joint", json!(best)), ("r_hat_max", json!(r_hat))];
+    if let (None, Some(q)) = (r_hat, stuck.or(quantities.first())) {
+        all.push((
+            "r_hat_max_reason",
+            json!(q.why_no_r_hat().map(|why| format!("{}: {why}", q.name))),
+        ));
+    }
+    all.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
+}
+
+/// Returns a hash of everything that the draws of the chains depend on, which identifies
+/// a run.
+fn identity(record: &Map<String, Value>) -> String {
+    let said = ["program_hash", "inputs_hash", "seed"]
+        .map(|key| record.get(key).cloned().unwrap_or_default());
+    let settings = ["warmup", "incremental"]
+        .map(|key| record.get("settings").and_then(|s| s.get(key)).cloned());
+    text_hash(&json!([said, settings]).to_string())
+}
+
+/// Returns sinks for each chain: its files, and its draws in memory for the summary.
+fn sinks(
+    dir: &RunDir,
+    job: &Job,
+    model: &Model,
+    memories: &[Memory],
+    record: &Map<String, Value>,
+    manner: &RunMode,
+) -> Result<Vec<Box<dyn Sink>>, Failure> {
+    let run = identity(record);
+    let comments = [
+        ("program", job.inputs.program.clone()),
+        ("program_hash", model.hash().to_owned()),
+        ("seed", job.sampling.seed.to_string()),
+    ];
+    let files = ChainFiles { dir, run: &run, comments: &comments };
+    let mut sinks: Vec<Box<dyn Sink>> = Vec::new();
+    for (i, memory) in memories.iter().enumerate() {
+        let chain = match manner.resume {
+            true => files.resume(i as u32, memory),
+            false => files.begin(i as u32, memory),
+        };
+        let chain = chain.map_err(|e| plain(format!("{}: {e}", dir.path().display())))?;
+        sinks.push(match manner.stream {
+            true => Box::new(Streamed::new(chain)),
+            false => Box::new(chain),
+        });
+    }
+    Ok(sinks)
+}
+
+/// Returns the observations, as arguments of `--observe`.
+fn observed(job: &Job) -> impl Iterator<Item = String> {
+    job.observe.iter().cloned().chain(job.keypoints.iter().map(|k| format!("keypoints={k}")))
+}

@@ -1,0 +1,31 @@
+//! Runs of the command: their inputs, chains, progress and folders; and runs that have
+//! ended, read again. What is printed here is progress and notes.
+
+#![forbid(unsafe_code)]
+
+#[macro_use]
+pub mod print;
+
+pub mod args;
+pub mod best;
+pub mod edges;
+pub mod embedded;
+pub mod failure;
+pub mod files;
+pub mod inputs;
+pub mod job;
+pub mod keypoints;
+pub mod live;
+pub mod networks;
+pub mod people;
+pub mod places;
+pub mod progress;
+pub mod quality;
+pub mod ration;
+pub mod ready;
+pub mod reopening;
+pub mod resume;
+pub mod scene;
+pub mod stream;
+pub mod term;
+pub mod watched;

@@ -1,0 +1,10 @@
+//! Runs that have ended: shown, compared, reported.
+
+pub mod compare;
+pub mod date;
+pub mod film;
+pub mod page;
+pub mod reopened;
+pub mod report;
+pub mod seen;
+pub mod show;

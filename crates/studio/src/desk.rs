@@ -1,0 +1,363 @@
+//! Does what the page asks: every method of the protocol, by the sessions of the prompt and
+//! the runs of `pcadlang run`.
+
+use super::answer::Answer;
+use super::folder::Folder;
+use super::layout::{self, finite};
+use super::protocol::{self, Call, StateName};
+use super::results;
+use super::runs::Runs;
+use super::sessions::{OpenSession, Sessions, job_of};
+use super::states::{no_view, picture};
+use pcadlang_engine::trace::{Stop, Trace};
+use pcadlang_library::scene::ImageValue;
+use pcadlang_report::embedded;
+use pcadlang_report::pictures::png;
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::reopening::reopened::Reopened;
+use pcadlang_runs::scene;
+use pcadlang_runs::{files, inputs};
+use pcadlang_scene::render::View;
+use pcadlang_workbench::session::{
+    ChoiceRow, Layer, Marks, Request, Scores, from_json, observed_image, to_json,
+};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use tokio::sync::broadcast;
+
+/// The most choices in one answer.
+const CHOICES: usize = 2000;
+
+/// What the tabs of all browsers share.
+pub struct Desk {
+    /// The opened folder.
+    pub folder: Folder,
+    /// The open sessions.
+    pub sessions: Sessions,
+    /// The runs.
+    pub runs: Runs,
+    /// Events for every page.
+    pub events: broadcast::Sender<String>,
+}
+
+impl Desk {
+    /// Does what is asked, which may take as long as the program does.
+    pub fn answer(&self, call: Call) -> Result<Answer, Failure> {
+        let json = match call {
+            Call::Folder(_) => self.described(),
+            Call::Read(r) => json!({ "text": self.folder.read(&r.file)? }),
+            Call::Write(w) => {
+                self.folder.write(&w.file, &w.text)?;
+                self.tell(json!({ "event": "folder" }));
+                json!({})
+            }
+            Call::Evaluation(e) => self.folder.evaluation(&e.folder)?,
+            Call::Open(o) => self.open(&o)?,
+            Call::Describe(s) => self.session(s.session)?,
+            Call::Close(c) => {
+                self.sessions.close(c.session)?;
+                json!({})
+            }
+            Call::Replace(r) => self
+                .change(r.session, move |open| Ok(open.session.replace(&r.text).map(|_| ())?))?,
+            Call::Observe(o) => {
+                self.permit(&o.observe)?;
+                self.change(o.session, move |open| open.observe(o.observe, Stop::default()))?
+            }
+            Call::Enter(e) => self.enter(e.session, e.text)?,
+            Call::Interrupt(i) => {
+                self.sessions.get(i.session)?.interrupt();
+                json!({})
+            }
+            Call::Choices(c) => self.choices(c)?,
+            Call::Assign(a) => self.assign(a)?,
+            Call::Why(w) => {
+                let text = format!(":why {}", w.address);
+                let handle = self.sessions.get(w.session)?;
+                let said = handle.ask(move |open| Ok(open.session.enter(&text)?.text))?;
+                json!({ "text": said })
+            }
+            Call::Complete(c) => {
+                let handle = self.sessions.get(c.session)?;
+                let found = handle.ask(move |open| Ok(open.session.complete(&c.text, c.at)))?;
+                let words: Vec<Value> = found.words.iter().map(|w| json!({ "word": w })).collect();
+                json!({ "from": found.start, "words": words })
+            }
+            Call::Begin(b) => self.begin(b)?,
+            Call::Pause(r) => {
+                let run = self.runs.get(&r.run)?;
+                run.pause()?;
+                self.tell_run(run.described())
+            }
+            Call::GoOn(r) => {
+                let run = self.runs.go_on(&r.run)?;
+                self.tell_run(run.described())
+            }
+            Call::Stop(r) => {
+                let run = self.runs.get(&r.run)?;
+                run.stop()?;
+                self.tell_run(run.described())
+            }
+            Call::Runs(_) => json!({ "runs": self.runs.described() }),
+            Call::Remove(r) => {
+                self.runs.remove(&r.run)?;
+                json!({})
+            }
+            Call::Kept(r) => results::kept(&*self.runs.get(&r.run)?)?,
+            Call::Summary(r) => results::summary(&*self.runs.get(&r.run)?)?,
+            Call::Quantity(q) => results::quantity(&*self.runs.get(&q.run)?, &q.names)?,
+            Call::Compare(c) => results::compared(&*self.runs.get(&c.a)?, &*self.runs.get(&c.b)?)?,
+            Call::Export(e) => {
+                let run = self.runs.get(&e.run)?;
+                let file = super::exports::export(&run, &e.kind)?;
+                json!({ "file": format!("{}/{file}", run.name) })
+            }
+            Call::Picture(p) => return self.picture(p),
+            Call::Mesh(m) => return self.mesh(&m),
+            Call::CameraOf(c) => {
+                self.with_view(&c.state, |view, _| Ok(embedded::camera(view.camera())))?
+            }
+        };
+        Ok(json.into())
+    }
+
+    /// Checks that observed files are of the opened folder.
+    fn permit(&self, observe: &[String]) -> Result<(), Failure> {
+        observe.iter().try_for_each(|spec| self.folder.file(inputs::file_of(spec)).map(|_| ()))
+    }
+
+    /// Sends an event to every page.
+    pub fn tell(&self, event: Value) {
+        // Nobody listens if no page is open.
+        let _ = self.events.send(event.to_string());
+    }
+
+    fn tell_run(&self, run: Value) -> Value {
+        self.tell(json!({ "event": "run", "run": run }));
+        run
+    }
+
+    fn tell_session(&self, id: u64, said: Value) -> Value {
+        self.tell(json!({ "event": "session", "session": id, "revision": said["revision"] }));
+        said
+    }
+
+    fn described(&self) -> Value {
+        let mut out = self.folder.described();
+        out["version"] = json!(env!("CARGO_PKG_VERSION"));
+        out["folder"] = json!(self.folder.path().file_name().and_then(|n| n.to_str()));
+        out["runs"] = json!(self.runs.described());
+        out["sessions"] = json!(self.sessions.ids());
+        out["threads"] = json!(pcadlang_runs::job::machine_threads());
+        out
+    }
+
+    fn open(&self, o: &protocol::Open) -> Result<Value, Failure> {
+        let handle = match (&o.program, &o.run) {
+            (Some(program), None) => {
+                self.folder.file(program)?;
+                self.permit(&o.observe)?;
+                self.sessions.open(job_of(program, &o.set, &o.observe), None)?
+            }
+            (None, Some(run)) => {
+                let run = Reopened::open(&self.runs.get(run)?.folder)?;
+                self.sessions.open(run.job.clone(), Some(run))?
+            }
+            _ => return Err(plain("`open` needs either a program or a run")),
+        };
+        let id = handle.id;
+        handle.ask(move |open| Ok(open.described(id)))
+    }
+
+    fn session(&self, id: u64) -> Result<Value, Failure> {
+        self.sessions.get(id)?.ask(move |open| Ok(open.described(id)))
+    }
+
+    /// Changes a session, tells all pages, and describes it.
+    fn change(
+        &self,
+        id: u64,
+        f: impl FnOnce(&mut OpenSession) -> Result<(), Failure> + Send + 'static,
+    ) -> Result<Value, Failure> {
+        let said = self.sessions.get(id)?.ask(move |open| {
+            f(open)?;
+            Ok(open.described(id))
+        })?;
+        Ok(self.tell_session(id, said))
+    }
+
+    fn enter(&self, id: u64, text: String) -> Result<Value, Failure> {
+        let handle = self.sessions.get(id)?;
+        let (said, opens) = handle.ask(move |open| {
+            let reply = open.session.enter(&text)?;
+            let (mut confirm, mut opens) = (Value::Null, None);
+            match reply.request {
+                Some(Request::Confirm { question, then }) => {
+                    confirm = json!({ "question": question, "then": then });
+                }
+                Some(Request::Open(folder)) => opens = Some(folder),
+                Some(Request::Edit) => {
+                    return Err(plain("the program is in the editor beside the prompt"));
+                }
+                None => {}
+            }
+            if let Some((picture, file)) =
+                reply.picture.as_ref().and_then(|p| Some((p, p.file.as_ref()?)))
+            {
+                let bytes = png(&picture.pixels()).map_err(|e| plain(e.to_string()))?;
+                files::write(file, &bytes)?;
+            }
+            let said = json!({
+                "text": reply.text, "picture": reply.picture.is_some(), "clears": reply.clears,
+                "ends": reply.ends, "confirm": confirm, "revision": open.session.revision(),
+            });
+            Ok((said, opens))
+        })?;
+        if let Some(folder) = opens {
+            let name = folder.to_string_lossy().into_owned();
+            let run = Reopened::open(&self.runs.get(&name)?.folder)?;
+            handle.ask(move |open| open.load(&run, Stop::default()))?;
+        }
+        Ok(self.tell_session(id, said))
+    }
+
+    fn choices(&self, c: protocol::Choices) -> Result<Value, Failure> {
+        let (from, count) = (c.from, c.count.unwrap_or(CHOICES).min(CHOICES));
+        let wanted = c.select.unwrap_or_default();
+        let listed = move |trace: &Trace, rates: &BTreeMap<String, f64>, marks: &Marks| {
+            let mut all = ChoiceRow::all(trace);
+            all.retain(|c| c.address.contains(&wanted));
+            let total = all.len();
+            let rows: Vec<Value> =
+                all.iter().skip(from).take(count).map(|c| row(c, rates, marks)).collect();
+            let observed = trace.observations();
+            let observed = observed.iter().take(CHOICES);
+            let observed = observed
+                .map(|(a, s)| json!({ "address": a.to_string(), "log_density": finite(*s) }));
+            let mut out = scores(Scores::of(trace));
+            out["total"] = json!(total);
+            out["choices"] = json!(rows);
+            out["observed"] = json!(observed.collect::<Vec<_>>());
+            out
+        };
+        match (&c.state.session, &c.state.run) {
+            (Some(id), None) => {
+                let rates =
+                    self.runs.of_session(*id).map(|r| results::acceptance(&r)).unwrap_or_default();
+                self.sessions.get(*id)?.ask(move |open| {
+                    let marks = open.session.marks();
+                    let mut out = listed(open.session.trace(), &rates, &marks);
+                    out["revision"] = json!(open.session.revision());
+                    Ok(out)
+                })
+            }
+            (None, Some(run)) => {
+                let run = self.runs.get(run)?;
+                let state = run.state(&c.state)?;
+                Ok(listed(&state.trace, &results::acceptance(&run), &Marks::default()))
+            }
+            _ => Err(no_state()),
+        }
+    }
+
+    fn assign(&self, a: protocol::Assign) -> Result<Value, Failure> {
+        let value = from_json(&a.value).map_err(plain)?;
+        let id = a.session;
+        let said = self.sessions.get(id)?.ask(move |open| {
+            let after = open.session.assign(&a.address, value, a.drag)?;
+            let mut out = scores(after);
+            out["revision"] = json!(open.session.revision());
+            Ok(out)
+        })?;
+        Ok(self.tell_session(id, said))
+    }
+
+    fn begin(&self, b: protocol::Begin) -> Result<Value, Failure> {
+        let folder = self.folder.path().to_owned();
+        let job = self.sessions.get(b.session)?.ask(move |open| {
+            open.write_program(&folder)?;
+            Ok(open.job.clone())
+        })?;
+        let run = self.runs.begin(job, &b.settings, b.session)?;
+        Ok(self.tell_run(run.described()))
+    }
+
+    fn picture(&self, p: protocol::Picture) -> Result<Answer, Failure> {
+        let layer = Layer::ALL.into_iter().find(|l| l.name() == p.layer);
+        let layer = layer.ok_or_else(|| {
+            let names: Vec<&str> = Layer::ALL.iter().map(|l| l.name()).collect();
+            let problem = plain(format!("there is no layer `{}`", p.layer));
+            problem.hint(format!("one of {}", names.join(", ")))
+        })?;
+        if let (None, Some(run)) = (&p.state.session, &p.state.run) {
+            let (header, data) = self.runs.get(run)?.picture(&p.state, layer, p.size, p.camera)?;
+            return Ok(Answer::Bytes(header, data));
+        }
+        let id = p.state.session.ok_or_else(no_state)?;
+        let (header, data) = self.sessions.get(id)?.ask(move |open| {
+            let view = open.session.view().ok_or_else(no_view)?;
+            let image = observed_image(open.session.model().code());
+            let image = image.as_ref().and_then(|i| i.downcast::<ImageValue>());
+            let located = open.session.trace().located();
+            let (mut header, data) = picture(&view, image, &located, layer, p.size, p.camera)?;
+            header.insert("log_joint".into(), finite(open.session.trace().log_joint()));
+            header.insert("revision".into(), json!(open.session.revision()));
+            Ok((header, data))
+        })?;
+        Ok(Answer::Bytes(header, Arc::new(data)))
+    }
+
+    fn mesh(&self, m: &protocol::Mesh) -> Result<Answer, Failure> {
+        let limit = m.limit;
+        let (header, data) = self.with_view(&m.state, move |view, log_joint| {
+            let (mut header, data) = layout::mesh(view.solid(), limit).map_err(plain)?;
+            header.insert("log_joint".into(), finite(log_joint));
+            Ok((header, data))
+        })?;
+        Ok(Answer::Bytes(header, Arc::new(data)))
+    }
+
+    /// Does something with the view of a state and its log joint density.
+    fn with_view<T: Send + 'static>(
+        &self,
+        name: &StateName,
+        f: impl FnOnce(&Arc<View>, f64) -> Result<T, Failure> + Send + 'static,
+    ) -> Result<T, Failure> {
+        match (name.session, &name.run) {
+            (Some(id), None) => self.sessions.get(id)?.ask(move |open| {
+                let view = open.session.view().ok_or_else(no_view)?;
+                f(&view, open.session.trace().log_joint())
+            }),
+            (None, Some(run)) => {
+                let mut state = self.runs.get(run)?.state(name)?;
+                let log_joint = state.trace.log_joint();
+                let view = scene::view(&mut state.trace, scene::predictive(0, 0), None);
+                f(&view.ok_or_else(no_view)?, log_joint)
+            }
+            _ => Err(no_state()),
+        }
+    }
+}
+
+fn no_state() -> Failure {
+    plain("`state` needs either a session or a run")
+}
+
+fn scores(s: Scores) -> Value {
+    json!({
+        "log_joint": finite(s.joint), "log_prior": finite(s.prior),
+        "log_likelihood": finite(s.likelihood),
+    })
+}
+
+fn row(c: &ChoiceRow, rates: &BTreeMap<String, f64>, marks: &Marks) -> Value {
+    let tags = marks.tags.iter().filter(|(_, of)| of.contains(&c.address)).map(|(tag, _)| tag);
+    json!({
+        "address": c.address, "value": to_json(&c.value), "text": c.text(), "family": c.family,
+        "log_density": finite(c.log_density), "support": c.support, "low": c.bounds[0],
+        "high": c.bounds[1], "scale": c.scale, "acceptance": rates.get(&c.address),
+        "tags": tags.collect::<Vec<_>>(), "forced": marks.forced.contains(&c.address),
+        "frozen": marks.frozen.contains(&c.address),
+    })
+}

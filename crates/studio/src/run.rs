@@ -1,0 +1,456 @@
+//! One run: under way, with its chains in memory, or ended, with what its folder holds.
+
+use super::layout::finite;
+use super::slots::Slots;
+use pcadlang_inference::Progress;
+use pcadlang_report::RunDir;
+use pcadlang_runs::args::Job;
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::job::{self, CHECKPOINT, Interrupt, RunMode};
+use pcadlang_runs::ready::{self, Ready};
+use pcadlang_runs::reopening::reopened::Reopened;
+use pcadlang_runs::resume;
+use pcadlang_runs::watched::Watched;
+use serde_json::{Value, json};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// How many complete states a run keeps.
+const KEEP: u32 = 100;
+
+/// What a run is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Doing {
+    /// It waits for its turn.
+    Waiting,
+    /// Its chains run.
+    Running,
+    /// Its chains wait.
+    Paused,
+    /// It was stopped, and writes its files.
+    Stopping,
+    /// It has ended by itself.
+    Done,
+    /// It was stopped, and can go on.
+    Stopped,
+    /// It has failed.
+    Failed,
+    /// Another command began it, and did not end it.
+    Interrupted,
+}
+
+impl Doing {
+    /// Its name in the protocol.
+    pub fn name(self) -> &'static str {
+        match self {
+            Doing::Waiting => "waiting",
+            Doing::Running => "running",
+            Doing::Paused => "paused",
+            Doing::Stopping => "stopping",
+            Doing::Done => "done",
+            Doing::Stopped => "stopped",
+            Doing::Failed => "failed",
+            Doing::Interrupted => "interrupted",
+        }
+    }
+}
+
+/// Whether a run that is to go on has begun already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Begun {
+    /// It was paused, or had never stopped.
+    Already,
+    /// It must be started again.
+    Not,
+}
+
+/// A run.
+pub struct Run {
+    /// Its folder, relative to the opened one: its name in the protocol.
+    pub name: String,
+    /// Its folder.
+    pub folder: PathBuf,
+    /// What is run; `None` if its folder does not tell.
+    pub job: Option<Job>,
+    /// The session from which it was begun.
+    pub session: Option<u64>,
+    stop: AtomicBool,
+    inner: Mutex<Inner>,
+    /// Pictures of its states, see `states`.
+    pub(super) pictures: super::pictures::Pictures,
+}
+
+struct Inner {
+    doing: Doing,
+    /// What `run.json` says.
+    record: Value,
+    error: Option<String>,
+    ready: Option<Arc<Ready>>,
+    watched: Option<Arc<Watched>>,
+    clock: Clock,
+}
+
+/// A clock that stands still while a run is paused.
+#[derive(Clone, Copy, Debug, Default)]
+struct Clock {
+    before: Duration,
+    since: Option<Instant>,
+}
+
+impl Clock {
+    fn elapsed(&self) -> Duration {
+        self.before + self.since.map_or(Duration::ZERO, |s| s.elapsed())
+    }
+
+    fn halt(&mut self) {
+        *self = Clock { before: self.elapsed(), since: None };
+    }
+
+    fn go(&mut self) {
+        self.since = self.since.or(Some(Instant::now()));
+    }
+}
+
+impl Run {
+    /// A run that is about to begin.
+    pub fn new(name: &str, dir: RunDir, job: Job, session: u64) -> Run {
+        let record = json!({ "begun": pcadlang_runs::reopening::date::now() });
+        Run::of(name, dir.path(), Some(job), Some(session), Doing::Waiting, record)
+    }
+
+    /// A run that another command has left in a folder.
+    pub fn left(name: &str, folder: &Path) -> Result<Run, Failure> {
+        let record = resume::run(folder)?;
+        let doing = match record["state"].as_str() {
+            Some("done") => Doing::Done,
+            Some("interrupted") => Doing::Stopped,
+            Some("failed") => Doing::Failed,
+            _ => Doing::Interrupted,
+        };
+        let job = Reopened::open(folder).ok().map(|r| r.job);
+        Ok(Run::of(name, folder, job, None, doing, record))
+    }
+
+    fn of(
+        name: &str,
+        folder: &Path,
+        job: Option<Job>,
+        session: Option<u64>,
+        doing: Doing,
+        record: Value,
+    ) -> Run {
+        let error = record["error"].as_str().map(str::to_owned);
+        let before = Duration::try_from_secs_f64(record["seconds"].as_f64().unwrap_or(0.0));
+        let clock = Clock { before: before.unwrap_or_default(), since: None };
+        let inner = Inner { doing, record, error, ready: None, watched: None, clock };
+        Run {
+            name: name.to_owned(),
+            folder: folder.to_owned(),
+            job,
+            session,
+            stop: AtomicBool::new(false),
+            inner: Mutex::new(inner),
+            pictures: Default::default(),
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns what it is doing.
+    pub fn doing(&self) -> Doing {
+        self.lock().doing
+    }
+
+    /// Whether it has begun, or waits, and has not ended.
+    pub fn is_active(&self) -> bool {
+        use Doing::{Paused, Running, Stopping, Waiting};
+        matches!(self.doing(), Waiting | Running | Paused | Stopping)
+    }
+
+    /// Returns what its `run.json` says.
+    pub fn record(&self) -> Value {
+        self.lock().record.clone()
+    }
+
+    /// Returns what its `summary.json` says; null while its chains run.
+    pub fn summary_file(&self) -> Value {
+        let bytes = match self.watched() {
+            Some(_) => None,
+            None => std::fs::read(self.folder.join("summary.json")).ok(),
+        };
+        bytes.and_then(|b| serde_json::from_slice(&b).ok()).unwrap_or_default()
+    }
+
+    /// Returns the time at which it began, as text that sorts.
+    pub fn begun_at(&self) -> String {
+        self.lock().record["begun"].as_str().unwrap_or_default().to_owned()
+    }
+
+    /// Returns the compiled program, which is compiled now if it was not before.
+    pub fn ready(&self) -> Result<Arc<Ready>, Failure> {
+        if let Some(ready) = &self.lock().ready {
+            return Ok(Arc::clone(ready));
+        }
+        if self.is_active() {
+            return Err(plain("the run has not begun yet"));
+        }
+        let run = Reopened::open(&self.folder)?;
+        let ready = Arc::new(ready::prepare_program(run.program()?, &run.job, Instant::now())?);
+        self.lock().ready = Some(Arc::clone(&ready));
+        Ok(ready)
+    }
+
+    /// Returns what can be watched while its chains run.
+    pub fn watched(&self) -> Option<Arc<Watched>> {
+        self.lock().watched.clone()
+    }
+
+    /// Makes its chains wait.
+    pub fn pause(&self) -> Result<(), Failure> {
+        let mut inner = self.lock();
+        match inner.doing {
+            Doing::Paused => {}
+            Doing::Running => {
+                if let Some(w) = &inner.watched {
+                    w.progress.pause.begin();
+                }
+                inner.clock.halt();
+                inner.doing = Doing::Paused;
+            }
+            _ => return Err(plain(format!("{} is not running", self.name))),
+        }
+        Ok(())
+    }
+
+    /// Ends a pause. Returns whether the run must be started again instead.
+    pub fn unpause(&self) -> Result<Begun, Failure> {
+        let mut inner = self.lock();
+        match inner.doing {
+            Doing::Waiting | Doing::Running => {}
+            Doing::Paused => {
+                if let Some(w) = &inner.watched {
+                    w.progress.pause.end();
+                }
+                inner.clock.go();
+                inner.doing = Doing::Running;
+            }
+            Doing::Stopped | Doing::Interrupted if self.job.is_some() => {
+                inner.doing = Doing::Waiting;
+                self.stop.store(false, Ordering::SeqCst);
+                return Ok(Begun::Not);
+            }
+            Doing::Stopping => {
+                return Err(plain("the run is still writing its files"));
+            }
+            _ => return Err(plain(format!("{} has ended", self.name))),
+        }
+        Ok(Begun::Already)
+    }
+
+    /// Ends it at its next step; its draws and a checkpoint are kept.
+    pub fn stop(&self) -> Result<(), Failure> {
+        let mut inner = self.lock();
+        if !matches!(inner.doing, Doing::Waiting | Doing::Running | Doing::Paused | Doing::Stopping)
+        {
+            return Err(plain(format!("{} has ended", self.name)));
+        }
+        self.stop.store(true, Ordering::SeqCst);
+        if let Some(w) = &inner.watched {
+            w.progress.cancelled.store(true, Ordering::SeqCst);
+            w.progress.pause.end();
+        }
+        inner.doing = Doing::Stopping;
+        Ok(())
+    }
+
+    /// Does the run, on a thread of its own.
+    pub fn work(&self, slots: &Slots, interrupt: &Interrupt, resume: bool) {
+        let is_over = || self.stop.load(Ordering::SeqCst) || interrupt.asked();
+        let Some(_slot) = slots.take(is_over) else {
+            return self.end(Doing::Stopped, None);
+        };
+        let done = catch_unwind(AssertUnwindSafe(|| self.perform(interrupt, resume)));
+        match done {
+            Ok(Ok(true)) => self.end(Doing::Stopped, None),
+            Ok(Ok(false)) => self.end(Doing::Done, None),
+            Ok(Err(failure)) => self.end(Doing::Failed, Some(failure.to_string())),
+            Err(_) => self.end(Doing::Failed, Some("an internal error".to_owned())),
+        }
+    }
+
+    /// Returns whether the run was stopped.
+    fn perform(&self, interrupt: &Interrupt, resume: bool) -> Result<bool, Failure> {
+        let Some(job) = &self.job else {
+            return Err(plain("the folder does not record its command"));
+        };
+        self.lock().clock.go();
+        // A run that was stopped while it waited has left nothing.
+        let resume = resume && resume::left(&self.folder).is_some();
+        let ready = match resume {
+            true => {
+                let run = Reopened::open(&self.folder)?;
+                ready::prepare_program(run.program()?, job, Instant::now())?
+            }
+            false => ready::prepare(job, true)?,
+        };
+        let watched = Arc::new(Watched::new(job, &ready.model, KEEP));
+        let ready = Arc::new(ready);
+        let inputs = job::inputs_hash(job, &ready.model)?;
+        let record = job::record(job, ready.model.hash(), &inputs);
+        let dir = match resume {
+            true => resume::resumed(&self.folder, &record)?,
+            false => RunDir::create(&self.folder).map_err(|e| plain(e.to_string()))?,
+        };
+        {
+            let mut inner = self.lock();
+            (inner.ready, inner.watched) = (Some(Arc::clone(&ready)), Some(Arc::clone(&watched)));
+            if inner.doing == Doing::Waiting {
+                inner.doing = Doing::Running;
+            }
+            watched.progress.cancelled.store(self.stop.load(Ordering::SeqCst), Ordering::SeqCst);
+            inner.record = Value::Object(record.clone());
+        }
+        let manner = RunMode {
+            live: false,
+            checkpoint: CHECKPOINT,
+            resume,
+            keep: KEEP,
+            follow: None,
+            stream: false,
+        };
+        let done = job::perform_watched(job, &ready, &dir, &record, interrupt, manner, &watched)?;
+        Ok(done.interrupted)
+    }
+
+    /// Notes how it ended, and gives up the memory of its chains.
+    fn end(&self, doing: Doing, error: Option<String>) {
+        let left = resume::left(&self.folder);
+        let mut inner = self.lock();
+        inner.clock.halt();
+        inner.watched = None;
+        // A run that never wrote its folder keeps the record of its beginning.
+        if let Some(record) = left {
+            inner.record = record;
+        }
+        (inner.doing, inner.error) = (doing, error);
+        drop(inner);
+        self.pictures.forget();
+    }
+
+    /// Describes it, for the page.
+    pub fn described(&self) -> Value {
+        let inner = self.lock();
+        let record = &inner.record;
+        let elapsed = inner.clock.elapsed().as_secs_f64();
+        let chains = self.job.as_ref().map(|j| j.sampling.chains());
+        let limit = self.job.as_ref().and_then(|j| j.sampling.time).map(|t| t.as_secs_f64());
+        let mut out = json!({
+            "run": self.name,
+            "folder": self.name,
+            "program": self.job.as_ref().map(|j| &j.inputs.program),
+            "observe": self.job.as_ref().map(|j| &j.observe),
+            "set": self.job.as_ref().map(|j| j.inputs.sets.iter().cloned().collect::<std::collections::BTreeMap<_, _>>()),
+            "seed": self.job.as_ref().map(|j| j.sampling.seed),
+            "state": inner.doing.name(),
+            "chains": chains,
+            "elapsed": elapsed,
+            "limit": limit,
+            "error": inner.error,
+            "begun": record["begun"],
+            "r_hat": record["r_hat_max"],
+            "session": self.session,
+        });
+        let more = match &inner.watched {
+            Some(w) => live(w, inner.doing, chains.unwrap_or(1), elapsed, limit),
+            None => {
+                let of = |key: &str| -> u64 {
+                    let each = record["chains"].as_array();
+                    each.into_iter().flatten().filter_map(|c| c[key].as_u64()).sum()
+                };
+                json!({
+                    "phase": inner.doing.name(), "ended": chains, "steps": of("steps") + of("warmup"), "draws": of("draws"),
+                    "best": record["best_log_joint"], "done": null, "left": null, "rate": null,
+                    "revision": record["best_log_joint"].as_f64().map_or(0, revision), "film": null,
+                })
+            }
+        };
+        if let (Value::Object(out), Value::Object(more)) = (&mut out, more) {
+            out.extend(more);
+        }
+        out
+    }
+}
+
+/// Describes the chains of a run that is under way.
+fn live(w: &Watched, doing: Doing, chains: u32, elapsed: f64, limit: Option<f64>) -> Value {
+    let p: &Progress = &w.progress;
+    let number = |n: &AtomicU32| n.load(Ordering::Relaxed);
+    let count = |n: &AtomicU64| n.load(Ordering::Relaxed);
+    let (started, ended) = (number(&p.started), number(&p.ended));
+    let phase = match doing {
+        Doing::Paused | Doing::Stopping => doing.name(),
+        _ if started == ended && ended < chains => "starting",
+        _ if started == ended => "writing",
+        _ if number(&p.warming) > 0 => "warm-up",
+        _ => "sampling",
+    };
+    let (pass, passes) = (count(&p.pass), count(&p.passes));
+    let done = match (limit, passes) {
+        (Some(limit), _) => json!((elapsed / limit).min(1.0)),
+        (None, 0) => Value::Null,
+        (None, _) => json!((pass as f64 / passes as f64).min(1.0)),
+    };
+    let steps = count(&p.steps);
+    let best = w.best.state();
+    let draws: u64 = w.memories.iter().map(|m| m.count()).sum();
+    json!({
+        "phase": phase,
+        "ended": ended,
+        "steps": steps,
+        "rate": finite(steps as f64 / elapsed),
+        "left": limit.map(|l| (l - elapsed).max(0.0)),
+        "done": done,
+        "best": best.as_ref().map(|b| finite(b.log_joint)),
+        "revision": best.map_or(0, |b| revision(b.log_joint)),
+        "draws": draws,
+        "film": w.trajectory.of_chain(0).len(),
+    })
+}
+
+/// Returns a whole number that grows with a log density, and that JSON keeps exactly.
+pub(super) fn revision(log_joint: f64) -> u64 {
+    let bits = log_joint.to_bits();
+    // The order of floating-point numbers as whole numbers (IEEE 754: sign and magnitude).
+    let ordered = if bits >> 63 == 1 { !bits } else { bits | 1 << 63 };
+    ordered >> 11
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_revision_grows_with_the_log_density() {
+        let all = [f64::NEG_INFINITY, -1e9, -20.5, -20.25, -0.0, 0.0, 1e-9, 3.0, 1e300];
+        let all = all.map(revision);
+        assert!(all.windows(2).all(|w| w[0] < w[1]), "{all:?}");
+        assert!(all.iter().all(|r| *r < 1 << 53));
+    }
+
+    #[test]
+    fn a_clock_stands_still_in_a_pause() {
+        let mut clock = Clock { before: Duration::from_secs(3), since: None };
+        assert_eq!(clock.elapsed(), Duration::from_secs(3));
+        clock.go();
+        std::thread::sleep(Duration::from_millis(2));
+        clock.halt();
+        let then = clock.elapsed();
+        assert!(then > Duration::from_secs(3));
+        assert_eq!(clock.elapsed(), then);
+    }
+}

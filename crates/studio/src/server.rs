@@ -1,0 +1,215 @@
+//! The web server: the page, the two sockets, photographs that are sent, files of the
+//! opened folder.
+
+use super::assets;
+use super::desk::Desk;
+use super::guard::{Guard, Refusal};
+use super::{language_socket, socket};
+use axum::Router;
+use axum::body::{Body, Bytes};
+use axum::extract::ws::{WebSocket, WebSocketUpgrade};
+use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
+use axum::http::StatusCode;
+use axum::http::header::{
+    CACHE_CONTROL, CONTENT_DISPOSITION, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName,
+    HeaderValue, REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
+};
+use axum::middleware::{Next, from_fn_with_state};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use pcadlang_runs::failure::Failure;
+use std::collections::HashMap;
+use std::future::Future;
+use std::sync::Arc;
+use tokio::sync::Semaphore;
+
+/// The largest photograph, in bytes.
+pub const PHOTOGRAPH: usize = 64 << 20;
+/// The largest file of the folder that is sent, in bytes.
+const FILE: u64 = 256 << 20;
+/// The largest text frame, in bytes.
+pub const FRAME: usize = 16 << 20;
+/// The most sockets that are open at a time.
+const SOCKETS: usize = 64;
+/// The most photographs that are received at a time.
+const UPLOADS: usize = 4;
+
+/// What the page may load: its own files, and pictures that it made itself.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; \
+     img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
+     frame-ancestors 'none'";
+
+/// What all handlers share.
+#[derive(Clone)]
+pub struct Server {
+    /// Does what is asked.
+    pub desk: Arc<Desk>,
+    guard: Arc<Guard>,
+    /// Where the files of the page are, if not in this program.
+    page: Option<Arc<std::path::Path>>,
+    sockets: Arc<Semaphore>,
+    uploads: Arc<Semaphore>,
+}
+
+/// The part of an address after the question mark.
+type Asked = Query<HashMap<String, String>>;
+
+/// Makes the routes of the server.
+pub fn router(desk: Arc<Desk>, guard: Arc<Guard>, page: Option<Arc<std::path::Path>>) -> Router {
+    let server = Server {
+        desk,
+        guard,
+        page,
+        sockets: Arc::new(Semaphore::new(SOCKETS)),
+        uploads: Arc::new(Semaphore::new(UPLOADS)),
+    };
+    let user = Router::new()
+        .route("/socket", get(open_socket))
+        .route("/language", get(open_language))
+        .route("/pictures", post(take_picture).layer(DefaultBodyLimit::max(PHOTOGRAPH)))
+        .route("/files/{*path}", get(send_file))
+        .route_layer(from_fn_with_state(server.clone(), with_token));
+    let page = Router::new()
+        .route("/", get(|State(s): State<Server>| async move { asset(&s, "index.html").await }))
+        .route(
+            "/{name}",
+            get(|State(s): State<Server>, Path(name): Path<String>| async move {
+                asset(&s, &name).await
+            }),
+        );
+    user.merge(page)
+        .fallback(|| async { refused((StatusCode::NOT_FOUND, "there is nothing at this address")) })
+        .layer(from_fn_with_state(server.clone(), guarded))
+        .with_state(server)
+}
+
+fn refused((status, text): Refusal) -> Response {
+    (status, format!("{text}\n")).into_response()
+}
+
+/// Refuses requests of other pages, and adds the headers that every answer has.
+async fn guarded(State(server): State<Server>, request: Request, next: Next) -> Response {
+    let mut response = match server.guard.check_origin(request.headers()) {
+        Ok(()) => next.run(request).await,
+        Err(refusal) => refused(refusal),
+    };
+    let mut add = |name: HeaderName, value: &'static str| {
+        response.headers_mut().entry(name).or_insert(HeaderValue::from_static(value));
+    };
+    add(CONTENT_SECURITY_POLICY, POLICY);
+    add(X_CONTENT_TYPE_OPTIONS, "nosniff");
+    add(X_FRAME_OPTIONS, "DENY");
+    add(REFERRER_POLICY, "no-referrer");
+    add(CACHE_CONTROL, "no-store");
+    response
+}
+
+async fn asset(server: &Server, name: &str) -> Response {
+    match assets::find(name, server.page.as_deref()) {
+        Some((kind, bytes)) => {
+            ([(CONTENT_TYPE, kind)], Body::from(Bytes::from_owner(bytes))).into_response()
+        }
+        None => refused((StatusCode::NOT_FOUND, "there is nothing at this address")),
+    }
+}
+
+/// Refuses requests without the token, before anything of them is read.
+async fn with_token(
+    State(server): State<Server>,
+    asked: Asked,
+    request: Request,
+    next: Next,
+) -> Response {
+    match server.guard.check_token(asked.get("token").map(String::as_str)) {
+        Ok(()) => next.run(request).await,
+        Err(refusal) => refused(refusal),
+    }
+}
+
+const BUSY: Refusal =
+    (StatusCode::SERVICE_UNAVAILABLE, "too many pages are open: close some of them");
+
+/// Opens a socket, if there is a place, and holds that until it has been served.
+fn opened<F>(
+    server: Server,
+    upgrade: WebSocketUpgrade,
+    serve: impl FnOnce(WebSocket, Arc<Desk>) -> F + Send + 'static,
+) -> Response
+where
+    F: Future<Output = ()> + Send,
+{
+    let Ok(place) = server.sockets.try_acquire_owned() else { return refused(BUSY) };
+    let upgrade = upgrade.max_message_size(FRAME).max_frame_size(FRAME);
+    upgrade.on_upgrade(move |socket| async move {
+        serve(socket, server.desk).await;
+        drop(place);
+    })
+}
+
+async fn open_socket(State(server): State<Server>, upgrade: WebSocketUpgrade) -> Response {
+    opened(server, upgrade, socket::serve)
+}
+
+async fn open_language(State(server): State<Server>, upgrade: WebSocketUpgrade) -> Response {
+    opened(server, upgrade, language_socket::serve)
+}
+
+fn problem(status: StatusCode, problem: &Failure) -> Response {
+    (status, format!("{problem}\n")).into_response()
+}
+
+async fn take_picture(State(server): State<Server>, asked: Asked, request: Request) -> Response {
+    let name = asked.get("name").cloned().unwrap_or_default();
+    let Ok(_place) = Arc::clone(&server.uploads).acquire_owned().await else {
+        return refused(BUSY);
+    };
+    let told = request.headers().get(axum::http::header::CONTENT_LENGTH);
+    let length = told.and_then(|l| l.to_str().ok()?.parse::<usize>().ok());
+    let large = (StatusCode::PAYLOAD_TOO_LARGE, "a photograph may have at most 64 MiB");
+    if length.is_some_and(|n| n > PHOTOGRAPH) {
+        return refused(large);
+    }
+    let bytes: Bytes = match axum::body::to_bytes(request.into_body(), PHOTOGRAPH).await {
+        Ok(bytes) => bytes,
+        Err(_) => return refused(large),
+    };
+    let desk = Arc::clone(&server.desk);
+    let stored = tokio::task::spawn_blocking(move || {
+        let file = desk.folder.store_picture(&name, &bytes)?;
+        desk.tell(serde_json::json!({ "event": "folder" }));
+        Ok::<_, Failure>(file)
+    });
+    match stored.await {
+        Ok(Ok(file)) => axum::Json(serde_json::json!({ "file": file })).into_response(),
+        Ok(Err(e)) => problem(StatusCode::BAD_REQUEST, &e),
+        Err(_) => refused((StatusCode::INTERNAL_SERVER_ERROR, "an internal error")),
+    }
+}
+
+async fn send_file(State(server): State<Server>, Path(path): Path<String>) -> Response {
+    let file = match server.desk.folder.file(&path) {
+        Ok(file) => file,
+        Err(e) => return problem(StatusCode::FORBIDDEN, &e),
+    };
+    let read = tokio::task::spawn_blocking(move || {
+        let known = std::fs::metadata(&file).is_ok_and(|m| m.is_file() && m.len() <= FILE);
+        known.then(|| std::fs::read(&file).ok()).flatten()
+    });
+    let Ok(Some(bytes)) = read.await else {
+        return refused((StatusCode::NOT_FOUND, "there is no such file"));
+    };
+    let end = path.rsplit('.').next().unwrap_or_default().to_lowercase();
+    let kind = match end.as_str() {
+        "png" => "image/png",
+        "jpg" | "jpeg" => "image/jpeg",
+        "json" => "application/json",
+        _ => "application/octet-stream",
+    };
+    let mut response = ([(CONTENT_TYPE, kind)], Body::from(bytes)).into_response();
+    // A file is never run as a page of this origin.
+    if !kind.starts_with("image/") {
+        let value = HeaderValue::from_static("attachment");
+        response.headers_mut().insert(CONTENT_DISPOSITION, value);
+    }
+    response
+}

@@ -1,0 +1,270 @@
+//! The open sessions: each has a thread of its own, on which everything that is asked of it
+//! is done in turn.
+
+use super::folder::is_picture;
+use super::layout::finite;
+use pcadlang_engine::lang::reach::path_within;
+use pcadlang_engine::trace::Stop;
+use pcadlang_library::Program;
+use pcadlang_library::scene::ImageValue;
+use pcadlang_runs::args::{Inputs, Job, Sampling};
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::reopening::reopened::Reopened;
+use pcadlang_runs::{inputs, quality};
+use pcadlang_workbench::session::{Session, observed_image};
+use pcadlang_workbench::tradeoff::Quality;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// The most sessions that are open at a time.
+const MOST: usize = 64;
+
+/// Something to do with a session.
+type Work = Box<dyn FnOnce(&mut OpenSession) + Send>;
+
+/// The open sessions.
+#[derive(Default)]
+pub struct Sessions {
+    all: Mutex<BTreeMap<u64, Arc<Handle>>>,
+    opened: AtomicU64,
+}
+
+/// A session, from outside its thread.
+pub struct Handle {
+    /// Its number.
+    pub id: u64,
+    /// Set to stop what it is doing.
+    stop: Arc<AtomicBool>,
+    work: Sender<Work>,
+}
+
+/// A session, on its thread.
+pub struct OpenSession {
+    /// The session.
+    pub session: Session,
+    /// The command line that gives its program and data.
+    pub job: Job,
+    /// What was said when it was opened.
+    pub note: String,
+    /// The names of its data that are not given.
+    missing: Vec<String>,
+}
+
+/// Makes the job of a program that observes some files.
+pub fn job_of(program: &str, sets: &BTreeMap<String, String>, observe: &[String]) -> Job {
+    let inputs = Inputs {
+        program: program.to_owned(),
+        sets: sets.iter().map(|(k, v)| (k.clone(), v.clone())).collect(),
+        camera: None,
+        edges: None,
+        who: Default::default(),
+        allowed: Default::default(),
+    };
+    let sampling = Sampling { seed: 1, ..Sampling::default() };
+    Job { observe: observe.to_vec(), ..Job::of(inputs, sampling) }
+}
+
+impl Sessions {
+    /// Opens a session for a job, or with the best state of a run.
+    pub fn open(&self, job: Job, run: Option<Reopened>) -> Result<Arc<Handle>, Failure> {
+        if self.ids().len() >= MOST {
+            let problem = plain(format!("{MOST} sessions are open"));
+            return Err(problem.hint("close one of them first"));
+        }
+        let id = self.opened.fetch_add(1, Ordering::SeqCst) + 1;
+        let stop = Arc::new(AtomicBool::new(false));
+        let (work, todo) = channel::<Work>();
+        let (told, opened) = channel();
+        let asked = Arc::clone(&stop);
+        let thread = std::thread::Builder::new().name(format!("session {id}"));
+        let begun = thread.spawn(move || {
+            // A session is not sent between threads, so it is opened on its own.
+            let open = catch_unwind(AssertUnwindSafe(|| OpenSession::open(job, run, asked)));
+            let mut open = match open {
+                Ok(Ok(open)) => open,
+                Ok(Err(problem)) => return told.send(Err(problem)).unwrap_or_default(),
+                Err(_) => return told.send(Err(internal())).unwrap_or_default(),
+            };
+            let _ = told.send(Ok(()));
+            for work in todo {
+                work(&mut open);
+            }
+        });
+        begun.map_err(|e| plain(format!("no thread can be started: {e}")))?;
+        opened.recv().unwrap_or_else(|_| Err(internal()))?;
+        let handle = Arc::new(Handle { id, stop, work });
+        // Not locked while the program is compiled: the other sessions go on meanwhile.
+        let mut all = self.all.lock().unwrap_or_else(PoisonError::into_inner);
+        all.insert(id, Arc::clone(&handle));
+        Ok(handle)
+    }
+
+    /// Returns an open session.
+    pub fn get(&self, id: u64) -> Result<Arc<Handle>, Failure> {
+        let all = self.all.lock().unwrap_or_else(PoisonError::into_inner);
+        all.get(&id).cloned().ok_or_else(|| plain(format!("session {id} is not open")))
+    }
+
+    /// Closes a session, which ends when it is done with what it is doing.
+    pub fn close(&self, id: u64) -> Result<(), Failure> {
+        let handle = self.get(id)?;
+        handle.interrupt();
+        self.all.lock().unwrap_or_else(PoisonError::into_inner).remove(&id);
+        Ok(())
+    }
+
+    /// Returns the numbers of the open sessions.
+    pub fn ids(&self) -> Vec<u64> {
+        self.all.lock().unwrap_or_else(PoisonError::into_inner).keys().copied().collect()
+    }
+}
+
+/// The message for a defect of the studio itself.
+fn internal() -> Failure {
+    plain("an internal error; the other sessions and the runs go on")
+}
+
+impl Handle {
+    /// Does something with the session, after what was asked before, and waits for it.
+    pub fn ask<T: Send + 'static>(
+        &self,
+        f: impl FnOnce(&mut OpenSession) -> Result<T, Failure> + Send + 'static,
+    ) -> Result<T, Failure> {
+        let (told, done) = channel();
+        let stop = Arc::clone(&self.stop);
+        let work: Work = Box::new(move |open| {
+            stop.store(false, Ordering::SeqCst);
+            let done =
+                catch_unwind(AssertUnwindSafe(|| f(open))).unwrap_or_else(|_| Err(internal()));
+            let _ = told.send(done);
+        });
+        self.work.send(work).map_err(|_| plain("the session was closed"))?;
+        done.recv().unwrap_or_else(|_| Err(plain("the session was closed")))
+    }
+
+    /// Stops what the session is doing.
+    pub fn interrupt(&self) {
+        self.stop.store(true, Ordering::SeqCst);
+    }
+}
+
+impl OpenSession {
+    fn open(job: Job, run: Option<Reopened>, stop: Arc<AtomicBool>) -> Result<Self, Failure> {
+        let stop = Stop::when(stop);
+        match run {
+            Some(run) => OpenSession::of_run(&run, job.sampling.seed, stop),
+            None => OpenSession::of(inputs::program(&job.inputs, true)?, job, stop),
+        }
+    }
+
+    /// A session with the best state of a run.
+    fn of_run(run: &Reopened, seed: u64, stop: Stop) -> Result<Self, Failure> {
+        let (mut session, said) = run.session(seed, stop)?;
+        session.confine(Path::new("."));
+        let missing = session.program().missing_data();
+        Ok(OpenSession { session, job: run.job.clone(), note: said.text, missing })
+    }
+
+    fn of(program: Program, job: Job, stop: Stop) -> Result<Self, Failure> {
+        let (program, _) = inputs::observe(program, &job)?;
+        let missing = program.missing_data();
+        let (mut session, said) = Session::open(program, job.sampling.seed, stop)?;
+        session.confine(Path::new("."));
+        Ok(OpenSession { session, job, note: said.text, missing })
+    }
+
+    /// Gives the program other data. `:undo` goes back to the program with the old data.
+    pub fn observe(&mut self, observe: Vec<String>, stop: Stop) -> Result<(), Failure> {
+        let job = Job { observe, ..self.job.clone() };
+        let program = inputs::program(&job.inputs, true)?;
+        let program = match program.text() == self.session.text() {
+            true => program,
+            false => program.edited(self.session.text())?,
+        };
+        self.take_over(OpenSession::of(program, job, stop)?, "other data");
+        Ok(())
+    }
+
+    /// Goes on with a run. `:undo` goes back.
+    pub fn load(&mut self, run: &Reopened, stop: Stop) -> Result<(), Failure> {
+        let other = OpenSession::of_run(run, self.job.sampling.seed, stop)?;
+        self.take_over(other, &format!(":load {}", run.folder().display()));
+        Ok(())
+    }
+
+    fn take_over(&mut self, other: OpenSession, what: &str) {
+        self.session.take_over(other.session, what);
+        (self.job, self.note, self.missing) = (other.job, other.note, other.missing);
+    }
+
+    /// Writes the program to its file if it was changed, so that a run can read it. An
+    /// edited shipped program becomes a file of the folder.
+    pub fn write_program(&self, folder: &Path) -> Result<(), Failure> {
+        let (name, text) = (&self.job.inputs.program, self.session.text());
+        let there = Program::open_allowing(name, &self.job.inputs.allowed.allow_read);
+        if there.is_ok_and(|p| p.text() == text) {
+            return Ok(());
+        }
+        let path = path_within(folder, name).map_err(plain)?;
+        pcadlang_runs::files::write(&path, text.as_bytes())
+    }
+
+    /// Describes the session, for the page.
+    pub fn described(&mut self, id: u64) -> Value {
+        let view = self.session.view();
+        let s = &self.session;
+        let interface = s.program().interface();
+        let image = observed_image(s.model().code());
+        let photo = image
+            .as_ref()
+            .and_then(|i| i.downcast::<ImageValue>()?.as_photo().map(|p| (p.width(), p.height())));
+        let name = self.job.observe.iter().map(|o| inputs::file_of(o)).find(|f| is_picture(f));
+        let given = |d: &str| !self.missing.iter().any(|m| m == d);
+        let data: Vec<Value> = interface
+            .data
+            .iter()
+            .map(|d| json!({ "name": d.name, "kind": d.ty, "given": given(&d.name) }))
+            .collect();
+        let set = |name: &str| self.job.inputs.sets.iter().find(|(n, _)| n == name).map(|(_, v)| v);
+        let params: Vec<Value> = interface
+            .params
+            .iter()
+            .map(|p| json!({ "name": p.name, "value": set(&p.name).or(p.default.as_ref()), "about": p.help }))
+            .collect();
+        let [undo, redo] = s.history();
+        json!({
+            "session": id,
+            "program": self.job.inputs.program,
+            "text": s.text(),
+            "note": self.note,
+            "observe": self.job.observe,
+            "photo": photo.map(|(w, h)| json!({ "name": name, "width": w, "height": h })),
+            "data": data,
+            "params": params,
+            "revision": s.revision(),
+            "log_joint": finite(s.trace().log_joint()),
+            "undo": undo,
+            "redo": redo,
+            "has_view": view.is_some(),
+            "plans": s.model().plan_names().collect::<Vec<_>>(),
+            "presets": presets(&self.job),
+            "background": s.background().map(|(number, done)| json!({ "number": number, "done": done })),
+        })
+    }
+}
+
+/// Lists the presets that a run of a job can use.
+fn presets(job: &Job) -> Vec<Value> {
+    let Ok(Some((_, presets))) = quality::presets(&job.inputs.program) else { return Vec::new() };
+    let of = |q: Quality| {
+        let preset = presets.of_quality(q)?.preset;
+        let about = format!("{:.0} s, error {} ({})", preset.seconds, preset.error, presets.error);
+        Some(json!({ "name": q.name(), "about": about }))
+    };
+    Quality::ALL.into_iter().filter_map(of).collect()
+}

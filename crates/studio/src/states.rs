@@ -1,0 +1,193 @@
+//! States of runs: which trace a name stands for, and its picture.
+
+use super::pictures::Encoded;
+use super::protocol::{StateName, Viewpoint};
+use super::run::{Run, revision};
+use pcadlang_engine::lang::value::Located;
+use pcadlang_engine::trace::{SavedTrace, Trace};
+use pcadlang_inference::{KeptTrace, TrajectoryState};
+use pcadlang_library::scene::ImageValue;
+use pcadlang_report::Mode;
+use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::ready::Ready;
+use pcadlang_runs::reopening::film::best_chain;
+use pcadlang_runs::reopening::reopened::Reopened;
+use pcadlang_runs::scene;
+use pcadlang_scene::render::{Camera, Projection, View};
+use pcadlang_workbench::session::Layer;
+use serde_json::{Map, Value, json};
+use std::sync::Arc;
+
+/// The longer side of pictures, in pixels.
+const SIDES: std::ops::RangeInclusive<u32> = 16..=2048;
+
+/// A trace of a run, with the program it belongs to.
+pub struct RunState {
+    /// The compiled program.
+    pub ready: Arc<Ready>,
+    /// The trace.
+    pub trace: Trace,
+}
+
+impl Run {
+    /// Returns the kept draws, chain by chain.
+    pub fn kept(&self) -> Result<Vec<KeptTrace>, Failure> {
+        match self.watched() {
+            Some(w) => Ok(w.kept.all()),
+            // It waits, or is being prepared.
+            None if self.is_active() => Ok(Vec::new()),
+            None => Ok(Reopened::open(&self.folder)?.traces().unwrap_or_default()),
+        }
+    }
+
+    /// Returns the states on the way of the chain that ended best.
+    pub fn film(&self) -> Result<Vec<TrajectoryState>, Failure> {
+        let all = match self.watched() {
+            Some(w) => w.trajectory.all(),
+            None if self.is_active() => Vec::new(),
+            None => Reopened::open(&self.folder)?.trajectory().unwrap_or_default(),
+        };
+        Ok(best_chain(&all).into_iter().cloned().collect())
+    }
+
+    /// Returns the modes, once the run has ended.
+    pub fn modes(&self) -> Vec<Mode> {
+        serde_json::from_value(self.summary_file()["modes"].clone()).unwrap_or_default()
+    }
+
+    /// Builds the trace of a state.
+    pub fn state(&self, name: &StateName) -> Result<RunState, Failure> {
+        let ready = self.ready()?;
+        let missing = |what: &str, n: usize| plain(format!("{} has no {what} {n}", self.name));
+        let saved: SavedTrace = match *name {
+            // Kept draws are thinned while a run goes on: a page may know of more.
+            StateName { draw: Some(n), .. } => {
+                let mut kept = self.kept()?;
+                let last = kept.len().checked_sub(1).ok_or_else(|| missing("kept draw", n))?;
+                kept.swap_remove(n.min(last)).trace
+            }
+            StateName { film: Some(n), .. } => {
+                self.film()?.into_iter().nth(n).ok_or_else(|| missing("film state", n))?.trace
+            }
+            StateName { mode: Some(n), .. } => {
+                let modes = self.modes();
+                let mode = modes.get(n).ok_or_else(|| missing("mode", n))?;
+                let of = |k: &KeptTrace| mode.chains.contains(&(k.chain as usize));
+                let best = self.kept()?.into_iter().filter(of);
+                let best = best.max_by(|a, b| a.log_joint.total_cmp(&b.log_joint));
+                best.ok_or_else(|| missing("kept draw of mode", n))?.trace
+            }
+            _ => match self.watched() {
+                Some(w) => {
+                    let state = w.best.state().ok_or_else(|| plain("the run has no state yet"))?;
+                    let draws = scene::predictive(0, 0);
+                    let trace = scene::rebuilt(&ready.model, &state.choices, draws)?;
+                    return Ok(RunState { ready, trace });
+                }
+                None => Reopened::open(&self.folder)?.best()?,
+            },
+        };
+        let trace = scene::loaded(&ready.model, &saved).map_err(|e| plain(e.to_string()))?;
+        Ok(RunState { ready, trace })
+    }
+
+    /// Draws a picture of a state, or returns the one that was drawn before.
+    pub fn picture(
+        &self,
+        name: &StateName,
+        layer: Layer,
+        size: u32,
+        camera: Option<Viewpoint>,
+    ) -> Result<Encoded, Failure> {
+        let is_best = name.draw.or(name.film).or(name.mode).is_none();
+        let watched = self.watched().filter(|_| is_best);
+        let (best, is_working) = match &watched {
+            Some(w) => (w.best.state().map(|b| b.log_joint), !w.progress.pause.is_on()),
+            None => (None, false),
+        };
+        let key = format!("{name:?} {layer:?} {size} {camera:?} {best:?}");
+        let _drawing = watched.as_ref().map(|_| self.pictures.alone());
+        if let Some(picture) = self.pictures.get(&key) {
+            return Ok(picture);
+        }
+        let picture = self.pictures.in_turn(is_working, || {
+            let mut state = self.state(name)?;
+            let log_joint = state.trace.log_joint();
+            let draws = scene::predictive(0, 0);
+            let view = scene::view(&mut state.trace, draws, None).ok_or_else(no_view)?;
+            let located = state.trace.located();
+            let (mut header, data) =
+                picture(&view, state.ready.image(), &located, layer, size, camera)?;
+            header.insert("log_joint".into(), super::layout::finite(log_joint));
+            header.insert("revision".into(), json!(revision(log_joint)));
+            Ok::<_, Failure>((header, Arc::new(data)))
+        })?;
+        self.pictures.keep(key, &picture);
+        Ok(picture)
+    }
+}
+
+/// The message where nothing can be drawn.
+pub fn no_view() -> Failure {
+    plain("the program has no view and no solid").hint("let view = scene.render(solid);")
+}
+
+/// Draws a picture of a scene as a file, with its header.
+pub fn picture(
+    view: &Arc<View>,
+    image: Option<&ImageValue>,
+    located: &[Located],
+    layer: Layer,
+    size: u32,
+    camera: Option<Viewpoint>,
+) -> Result<(Map<String, Value>, Vec<u8>), Failure> {
+    if !SIDES.contains(&size) {
+        return Err(plain(format!("`size` must be from {} to {}", SIDES.start(), SIDES.end())));
+    }
+    // From elsewhere the photograph does not lie behind the scene.
+    let drawn = match camera {
+        Some(viewpoint) => {
+            let camera = seen_from(viewpoint, view.camera())?;
+            let view = Arc::new(View::new(view.solid().clone(), camera));
+            layer.draw(&view, None, &[], size)
+        }
+        None => layer.draw(view, image, located, size),
+    };
+    let drawn = drawn.map_err(plain)?;
+    let bytes = encoded(&drawn)?;
+    let mut header = Map::new();
+    header.insert("type".into(), json!("image/png"));
+    header.insert("width".into(), json!(drawn.width()));
+    header.insert("height".into(), json!(drawn.height()));
+    Ok((header, bytes))
+}
+
+/// Encodes a picture as PNG at the least effort: the way to the page is short, and that takes
+/// a fraction of the time of JPEG.
+fn encoded(picture: &image::RgbImage) -> Result<Vec<u8>, Failure> {
+    use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+    let mut bytes = Vec::new();
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub);
+    picture.write_with_encoder(encoder).map_err(|e| plain(e.to_string()))?;
+    Ok(bytes)
+}
+
+/// Returns a camera at a viewpoint, with the size of another one's pictures.
+fn seen_from(v: Viewpoint, other: &Camera) -> Result<Camera, Failure> {
+    use glam::DVec3;
+    let wrong = || {
+        plain(
+            "`camera` needs an eye, another target, and an up that is not the direction between them",
+        )
+    };
+    let [eye, target, up] = [v.eye, v.target, v.up].map(DVec3::from_array);
+    let forward = (target - eye).try_normalize().ok_or_else(wrong)?;
+    let right = forward.cross(up).try_normalize().ok_or_else(wrong)?;
+    if !eye.is_finite() || !(1.0..=170.0).contains(&v.fov_y) {
+        return Err(wrong());
+    }
+    let (width, height) = (f64::from(other.width), f64::from(other.height));
+    let focal_px = 0.5 * height / (0.5 * v.fov_y.to_radians()).tan();
+    let projection = Projection::Pinhole { focal_px, cx: 0.5 * width, cy: 0.5 * height };
+    Ok(Camera { eye, right, up: right.cross(forward), forward, projection, ..*other })
+}
