@@ -6,7 +6,6 @@ pub use repl::{Graphics, Repl};
 
 use super::detect::Detect;
 use super::manual::{Completions, Man};
-use clap::builder::TypedValueParser;
 use clap::{Args, Parser, Subcommand, ValueHint};
 pub use pcadlang_runs::args::{
     Allowed, Compare, Film, Inputs, Job, Live, QualityArg, Report, Run, Sampling, Show,
