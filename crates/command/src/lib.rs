@@ -1,6 +1,6 @@
 //! The commands. Only these modules print; the library does the work.
-
 #![forbid(unsafe_code)]
+#![warn(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 #[macro_use]
 extern crate pcadlang_runs;

@@ -2,6 +2,7 @@
 //! interpreter of their files, and what makes people of their outputs.
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]
+#![warn(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 pub mod nn;
 pub mod people;

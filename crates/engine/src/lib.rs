@@ -2,9 +2,9 @@
 //!
 //! [`lang`] lowers programs to code and has the one table of built-ins; [`trace`] executes
 //! code into addressed traces of random choices. Neither knows anything of pictures.
-
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]
+#![warn(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 pub mod lang;
 #[cfg(test)]

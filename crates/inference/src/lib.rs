@@ -1,5 +1,8 @@
 //! Inference: kernels, plans, chains and diagnostics. Depends on traces, and not on
 //! pictures.
+#![warn(missing_docs)]
+#![forbid(unsafe_code)]
+#![warn(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 pub mod calibration;
 mod callback;

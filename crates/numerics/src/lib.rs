@@ -2,6 +2,7 @@
 //! counter-based randomness, and parallel maps. It knows nothing of programs or images.
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]
+#![warn(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 pub mod dist;
 pub mod num;

@@ -4,6 +4,9 @@
 //! This module neither prints nor makes decisions; it turns results into text and files.
 //! It depends on draws, diagnostics, meshes and drawn pictures, but not on programs or
 //! traces.
+#![warn(missing_docs)]
+#![forbid(unsafe_code)]
+#![warn(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 mod aligned;
 mod atomic_write;

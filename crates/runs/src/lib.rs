@@ -1,7 +1,7 @@
 //! Runs of the command: their inputs, chains, progress and folders; and runs that have
 //! ended, read again. What is printed here is progress and notes.
-
 #![forbid(unsafe_code)]
+#![warn(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 #[macro_use]
 pub mod print;

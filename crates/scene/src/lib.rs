@@ -2,6 +2,7 @@
 //! knows nothing of programs and traces, and can be used without them.
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]
+#![warn(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 mod contours;
 pub mod geom;

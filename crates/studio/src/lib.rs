@@ -1,8 +1,8 @@
 //! `pcadlang studio`: a web application on this machine, for a program, a photograph and
 //! the runs over it. Its sessions are those of the prompt, its runs those of `run`; the
 //! protocol is described in docs/reference/studio.md.
-
 #![forbid(unsafe_code)]
+#![warn(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 #[macro_use]
 extern crate pcadlang_runs;

@@ -6,6 +6,9 @@
 //! the tree through `build`. Where the text does not fit the grammar, `recover` repairs
 //! the tokens and parses again, with `advice` on what was probably meant. `format`
 //! converts a tree back to text.
+#![warn(missing_docs)]
+#![forbid(unsafe_code)]
+#![warn(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 mod address;
 mod advice;
