@@ -8,9 +8,9 @@ mod common;
 
 use common::{photograph, picture, pose, short, vase};
 use criterion::{Criterion, criterion_group, criterion_main};
-use pcadlang::render::{Camera, Channels, Contours, Frame};
-use pcadlang::vision::features::{Query, contour_features, observed, rendered};
-use pcadlang::vision::{
+use pcadlang_scene::render::{Camera, Channels, Contours, Frame};
+use pcadlang_scene::vision::features::{Query, contour_features, observed, rendered};
+use pcadlang_scene::vision::{
     Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood,
     DepthMap, GradientDetector, Limits, Mask, MaskLikelihood, Region, RegionOptions, chamfer,
     contour_ratio, distance_transform, gradient, nms, photo,

@@ -5,12 +5,12 @@
 //! with that name.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use pcadlang::dist::Datum;
-use pcadlang::infer::{Drift, Gibbs, Kernel, Mh, Pick, SiteSelection, StepContext};
-use pcadlang::lang::value::Value;
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace::{Change, ChoiceKind, Draws, Selector, Trace};
 use pcadlang::{Model, Program};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Change, ChoiceKind, Draws, Selector, Trace};
+use pcadlang_inference::{Drift, Gibbs, Kernel, Mh, Pick, SiteSelection, StepContext};
+use pcadlang_numerics::dist::Datum;
+use pcadlang_numerics::rng::{Purpose, StreamKey};
 use std::hint::black_box;
 
 /// Compiles a line through `n` points, observed as one array or one by one.

@@ -4,13 +4,10 @@
 //! [`Program`] and [`Model`] are the entry points; [`trace::Trace`] is the engine's
 //! central data structure; [`host`] lets a program that embeds the language register its
 //! own functions, distributions, likelihoods and kernels. What `docs/reference/api.md`
-//! lists follows semantic versioning and is exercised by the doc-tests; the rest is public
-//! for tests and tools, and may change at any time.
+//! lists follows semantic versioning and is exercised by the doc-tests.
 //!
 //! This crate holds no code: each floor below it is a crate in `crates`, and what they
-//! promise is named here. The engine ([`lang`], [`trace`], [`infer`]) knows nothing of
-//! pictures. The scene is its guest: [`scene`] registers the crates `pcadlang-scene` and
-//! `pcadlang-detectors` through [`host`], as any embedding program would.
+//! promise to those who embed the language is named here.
 #![doc = include_str!("guides/program.md")]
 #![doc = include_str!("guides/pictures.md")]
 #![warn(missing_docs)]
@@ -18,14 +15,6 @@
 
 #[cfg(feature = "command")]
 pub use pcadlang_command::command;
-pub use pcadlang_detectors::{nn, people};
-pub use pcadlang_engine::lang;
-pub use pcadlang_library::{scene, shipped, standard};
-pub use pcadlang_numerics::{dist, num, rng};
-pub use pcadlang_scene::{geom, render, vision};
-pub use pcadlang_syntax as syntax;
-pub use pcadlang_workbench::{bank, editor, score, session, tradeoff};
-
 pub use pcadlang_engine::lang::value::Value;
 pub use pcadlang_inference::RunOptions;
 pub use pcadlang_library::{Model, Posterior, Program};
@@ -35,7 +24,10 @@ pub use pcadlang_syntax::diag::Error;
 /// Error messages with the place of the mistake.
 #[doc = include_str!("guides/diag.md")]
 pub mod diag {
-    pub use pcadlang_syntax::diag::*;
+    pub use pcadlang_syntax::diag::{
+        Diagnostic, IntoDiagnostic, Label, Severity, SourceFile, SourceMap, render,
+    };
+    pub use pcadlang_syntax::span::{FileId, Span};
 }
 
 /// How a program that embeds the language registers what it brings.
@@ -44,20 +36,48 @@ pub mod host {
     pub use pcadlang_inference::host::*;
 }
 
-/// Kernels, plans, chains and diagnostics.
+/// Kernels, chains and what runs report while they go on.
 #[doc = include_str!("guides/infer.md")]
 pub mod infer {
-    pub use pcadlang_inference::*;
+    pub use pcadlang_inference::{
+        Block, Callback, Callbacks, ChainError, ChainResult, Checkpoint, Drift, Elliptical, Gibbs,
+        Kernel, Mh, Outcome, Pick, Progress, SiteSelection, Slice, StateError, StepContext, decide,
+        recoverable,
+    };
+
+    /// Where draws go, row by row.
+    pub mod draws {
+        pub use pcadlang_inference::draws::{Column, DrawRow, KernelStats, Sink};
+    }
 }
 
-/// What a run leaves: draws, tables, files, pictures, pages.
+/// What a run leaves: draws, quantities, folders.
 #[doc = include_str!("guides/report.md")]
 pub mod report {
-    pub use pcadlang_report::*;
+    pub use pcadlang_report::{ChainDraws, Memory, Quantity, RunDir, RunDirError, Tee, quantities};
+
+    /// Draws as CmdStan writes them.
+    pub mod csv {
+        pub use pcadlang_report::csv::CsvSink;
+    }
+}
+
+/// Streams of random numbers, by seed, chain, purpose and place.
+pub mod rng {
+    pub use pcadlang_numerics::rng::{Purpose, Stream, StreamKey};
+}
+
+/// A host comparator's access to a rendered scene.
+pub mod scene {
+    pub use pcadlang_library::scene::SceneView;
 }
 
 /// Executions of a program: choices by address, scores, updates, gradients.
 #[doc = include_str!("guides/trace.md")]
 pub mod trace {
-    pub use pcadlang_engine::trace::*;
+    pub use pcadlang_engine::trace::{
+        Address, AddressSegment, Change, ChoiceKind, Constraint, Draws, Given, Limits, Observation,
+        Pattern, PatternSegment, Replicate, RunError, SaveError, SavedTrace, Selection, Selector,
+        Stop, Target, Trace, TraceResult, Update, Weight,
+    };
 }

@@ -5,8 +5,8 @@
 //! this file is a program of its own.
 
 use pcadlang::Model;
-use pcadlang::infer::{Gibbs, Hmc, Kernel, Mh, Nuts, Pick, SiteSelection, StepContext};
-use pcadlang::trace::{Selector, Trace};
+use pcadlang_engine::trace::{Selector, Trace};
+use pcadlang_inference::{Gibbs, Hmc, Kernel, Mh, Nuts, Pick, SiteSelection, StepContext};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 

@@ -1,7 +1,7 @@
 //! A standing figure of 22 closed parts.
 
 use glam::Vec3;
-use pcadlang::geom::Mesh;
+use pcadlang_scene::geom::Mesh;
 
 /// The parts of a standing figure: centre, direction of the long axis, half length,
 /// radius.

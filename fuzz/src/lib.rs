@@ -8,22 +8,22 @@
 #[path = "../../crates/studio/src/protocol.rs"]
 mod protocol;
 
-use pcadlang::bank::Bank;
-use pcadlang::diag::{IntoDiagnostic, SourceMap, render};
-use pcadlang::geom::{FileFrame, UpAxis, gltf as gltf_file, obj as obj_file};
-use pcadlang::infer::draws::{Column, DrawRow, Sink};
-use pcadlang::infer::{Checkpoint, Progress};
-use pcadlang::lang::builtins::data::Options;
-use pcadlang::nn::Network;
-use pcadlang::num::fnv1a;
-use pcadlang::render::Camera;
-use pcadlang::report::checkpoint::SavedChain;
-use pcadlang::syntax::{parse, print, span::FileId};
-use pcadlang::trace::{Limits, SavedTrace, Trace};
-use pcadlang::vision::features::Query;
-use pcadlang::vision::keypoints::People;
-use pcadlang::vision::{Forest, Limits as Pixels, Photo, depth, mask, npy, photo};
 use pcadlang::{Model, Program, RunOptions};
+use pcadlang_detectors::nn::Network;
+use pcadlang_engine::lang::builtins::data::Options;
+use pcadlang_engine::trace::{Limits, SavedTrace, Trace};
+use pcadlang_inference::draws::{Column, DrawRow, Sink};
+use pcadlang_inference::{Checkpoint, Progress};
+use pcadlang_numerics::num::fnv1a;
+use pcadlang_report::checkpoint::SavedChain;
+use pcadlang_scene::geom::{FileFrame, UpAxis, gltf as gltf_file, obj as obj_file};
+use pcadlang_scene::render::Camera;
+use pcadlang_scene::vision::features::Query;
+use pcadlang_scene::vision::keypoints::People;
+use pcadlang_scene::vision::{Forest, Limits as Pixels, Photo, depth, mask, npy, photo};
+use pcadlang_syntax::diag::{IntoDiagnostic, SourceMap, render};
+use pcadlang_syntax::{parse, print, span::FileId};
+use pcadlang_workbench::bank::Bank;
 use std::io;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -34,7 +34,7 @@ const PIXELS: Pixels = Pixels { max_side: 512, max_pixels: 1 << 16 };
 
 /// Reads data as a program does. Every file that it requests has the contents `beside`.
 fn data(kind: &str, file: &str, bytes: &[u8], beside: &[u8]) -> bool {
-    pcadlang::standard::table()
+    pcadlang_library::standard::table()
         .load(kind, file, bytes, &Options::default(), &|_| Ok(beside.to_vec()))
         .is_ok()
 }
@@ -144,8 +144,8 @@ pub fn rig(bytes: &[u8]) {
         None => (bytes, CORNER),
     };
     data("armature", "x.rig.json", rig, beside);
-    if let Ok(file) = pcadlang::geom::armature::rig_from_json(rig) {
-        let _ = pcadlang::geom::armature::morphs_from_json(beside, &file.rig);
+    if let Ok(file) = pcadlang_scene::geom::armature::rig_from_json(rig) {
+        let _ = pcadlang_scene::geom::armature::morphs_from_json(beside, &file.rig);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Errors of programs as Python exceptions.
 
-use pcadlang::diag::Severity;
+use pcadlang_syntax::diag::Severity;
 use pyo3::create_exception;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;

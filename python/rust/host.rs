@@ -4,7 +4,7 @@ use crate::python_code::{
     Code, Failure, PythonDistribution, PythonKernel, PythonLikelihood, Space,
 };
 use crate::values::from_python;
-use pcadlang::host::{self, Entry, Type};
+use pcadlang_inference::host::{self, Entry, Type};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};

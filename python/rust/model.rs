@@ -7,15 +7,15 @@ use crate::sampling::{Run, Told};
 use crate::trace::Trace;
 use crate::values::datum;
 use crate::waiting::wait;
-use pcadlang::host::Datum;
-use pcadlang::infer::draws::Discard;
-use pcadlang::infer::{BestState, ChainResult, Progress, run_chains, run_from};
-use pcadlang::lang::code::Code;
-use pcadlang::lang::error::RunError;
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace;
-use pcadlang::trace::{Address, Constraint, Draws, SavedTrace};
 use pcadlang::{RunOptions, Value};
+use pcadlang_engine::lang::code::Code;
+use pcadlang_engine::lang::error::RunError;
+use pcadlang_engine::trace;
+use pcadlang_engine::trace::{Address, Constraint, Draws, SavedTrace};
+use pcadlang_inference::draws::Discard;
+use pcadlang_inference::host::Datum;
+use pcadlang_inference::{BestState, ChainResult, Progress, run_chains, run_from};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -127,8 +127,8 @@ impl Compiled {
         options: &RunOptions,
         threads: usize,
         progress: &Progress,
-        sinks: Vec<Box<dyn pcadlang::infer::draws::Sink>>,
-    ) -> Result<Vec<Result<ChainResult, pcadlang::infer::ChainError>>, pcadlang::Error> {
+        sinks: Vec<Box<dyn pcadlang_inference::draws::Sink>>,
+    ) -> Result<Vec<Result<ChainResult, pcadlang_inference::ChainError>>, pcadlang::Error> {
         let Some(plan) = plan else {
             return self.model.run_into(options, threads, progress, sinks);
         };

@@ -5,12 +5,12 @@ use crate::model::Compiled;
 use crate::trace::Trace;
 use crate::values::json;
 use numpy::{PyArray1, PyArrayMethods};
-use pcadlang::infer::draws::{MOST_POINTS, SiteStats};
-use pcadlang::infer::{BestState, ChainResult, Evidence};
-use pcadlang::report::inference::{Group, Numbers, groups};
-use pcadlang::report::{ChainDraws, Mode, Quantity, modes, quantities, table, warnings, widen};
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace::Draws;
+use pcadlang_engine::trace::Draws;
+use pcadlang_inference::draws::{MOST_POINTS, SiteStats};
+use pcadlang_inference::{BestState, ChainResult, Evidence};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
+use pcadlang_report::inference::{Group, Numbers, groups};
+use pcadlang_report::{ChainDraws, Mode, Quantity, modes, quantities, table, warnings, widen};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -239,7 +239,7 @@ pub fn predictive(seed: u64) -> Draws {
 
 fn numbers<'py>(
     py: Python<'py>,
-    array: &pcadlang::report::inference::Array,
+    array: &pcadlang_report::inference::Array,
 ) -> PyResult<Bound<'py, PyAny>> {
     let shape: Vec<usize> = array.dims.iter().map(|(_, n)| *n).collect();
     Ok(match &array.numbers {

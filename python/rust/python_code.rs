@@ -9,12 +9,12 @@ use crate::values::{
     adjoint_from_python, adjoint_to_python, datum, elements, from_python, numbers, to_python,
 };
 use pcadlang::Value;
-use pcadlang::host::{
+use pcadlang_engine::trace::{self, Limits, TraceResult};
+use pcadlang_inference::host::{
     Adjoint, Args, Datum, Distribution, Fault, FaultKind, Gradient, KernelCall, Likelihood, Support,
 };
-use pcadlang::infer::{Kernel, Outcome, SiteSelection, StepContext};
-use pcadlang::rng::Stream;
-use pcadlang::trace::{self, Limits, TraceResult};
+use pcadlang_inference::{Kernel, Outcome, SiteSelection, StepContext};
+use pcadlang_numerics::rng::Stream;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};

@@ -3,10 +3,10 @@
 use crate::errors::plain;
 use crate::values::{Adjoint, numbers, picture};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
-use pcadlang::geom::{Mesh, glb, obj};
-use pcadlang::render;
-use pcadlang::scene::SceneView;
-use pcadlang::session::over;
+use pcadlang_library::scene::SceneView;
+use pcadlang_scene::geom::{Mesh, glb, obj};
+use pcadlang_scene::render;
+use pcadlang_workbench::session::over;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -189,7 +189,7 @@ type VerticesAndTriangles<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2
 
 /// A solid, in scene units.
 #[pyclass(frozen, module = "pcadlang")]
-pub struct Solid(pub pcadlang::geom::Solid);
+pub struct Solid(pub pcadlang_scene::geom::Solid);
 
 impl Solid {
     fn meshed(&self, py: Python<'_>) -> PyResult<Mesh> {

@@ -9,8 +9,8 @@ use numpy::{
     PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pcadlang::Value;
-use pcadlang::host::{Adjoint as Derivatives, Datum};
-use pcadlang::scene::{SolidValue, ViewValue};
+use pcadlang_inference::host::{Adjoint as Derivatives, Datum};
+use pcadlang_library::scene::{SolidValue, ViewValue};
 use pyo3::exceptions::{PyAttributeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyList, PyString, PyTuple};

@@ -1,7 +1,7 @@
 //! Waiting for chains while Python stays responsive.
 
 use crate::model::Compiled;
-use pcadlang::infer::Progress;
+use pcadlang_inference::Progress;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -2,16 +2,16 @@
 //! used for proposals.
 
 use crate::common::folder::{Folder, disc, png};
-use pcadlang::bank::{Bank, BankError, Features, Observed, as_view};
-use pcadlang::infer::{Banks, Neighbours, RunOptions};
-use pcadlang::lang::value::Value;
-use pcadlang::render::Contours;
-use pcadlang::scene::{ImageValue, KeypointsValue};
-use pcadlang::trace::{Constraint, Draws, Limits, Trace};
-use pcadlang::vision::ContourMap;
-use pcadlang::vision::features::Query;
-use pcadlang::vision::keypoints::{Keypoint, Keypoints};
 use pcadlang::{Model, Program};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Constraint, Draws, Limits, Trace};
+use pcadlang_inference::{Banks, Neighbours, RunOptions};
+use pcadlang_library::scene::{ImageValue, KeypointsValue};
+use pcadlang_scene::render::Contours;
+use pcadlang_scene::vision::ContourMap;
+use pcadlang_scene::vision::features::Query;
+use pcadlang_scene::vision::keypoints::{Keypoint, Keypoints};
+use pcadlang_workbench::bank::{Bank, BankError, Features, Observed, as_view};
 use std::sync::Arc;
 
 /// A lathed solid, with or without a waist.
@@ -137,8 +137,9 @@ fn entries_come_back_and_the_nearest_picture_of_an_entry_is_its_own() {
         let (tx, ty, strength) = (c.tx.clone(), c.ty.clone(), vec![1.0; c.len()]);
         let map =
             ContourMap { width: 64, height: 64, x: c.x.clone(), y: c.y.clone(), tx, ty, strength };
-        let near =
-            bank.nearest(&Query::contours(&pcadlang::vision::features::observed(&map)), 3).unwrap();
+        let near = bank
+            .nearest(&Query::contours(&pcadlang_scene::vision::features::observed(&map)), 3)
+            .unwrap();
         assert_eq!(near[0].0, i);
     }
     assert!((8..32).contains(&waists), "{waists} of 40 have a waist");

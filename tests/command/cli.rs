@@ -16,7 +16,8 @@ fn sessions(name: &str, all: &[&[&str]]) {
 
 #[test]
 fn check_of_every_shipped_program() {
-    let all: Vec<Vec<&str>> = pcadlang::shipped::programs().map(|p| vec!["check", p]).collect();
+    let all: Vec<Vec<&str>> =
+        pcadlang_library::shipped::programs().map(|p| vec!["check", p]).collect();
     sessions("check", &all.iter().map(Vec::as_slice).collect::<Vec<_>>());
 }
 

@@ -185,7 +185,7 @@ fn a_client_plays_requests() {
 
     let options = json!({ "options": { "tabSize": 2, "insertSpaces": true } });
     assert_eq!(c.ask("textDocument/formatting", options.clone()).as_array().unwrap().len(), 1);
-    let formatted = pcadlang::syntax::format(&text).unwrap();
+    let formatted = pcadlang_syntax::format(&text).unwrap();
     assert_eq!(c.change(3, &formatted)["diagnostics"], json!([]));
     assert_eq!(c.ask("textDocument/formatting", options), json!([]));
 

@@ -3,7 +3,7 @@
 #![cfg(unix)]
 
 use crate::common::folder::Folder;
-use pcadlang::report::{checkpoint, csv};
+use pcadlang_report::{checkpoint, csv};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;

@@ -111,7 +111,7 @@ fn starts_of_the_lathe_are_seen_in_perspective() {
         infer { repeat 20 { mh(@x); collect x; } }";
     f.write("cup.pcad", cup);
     f.succeeds(&["run", "cup.pcad", "--chains", "1", "--quiet", "--out", "cup"]);
-    let text = pcadlang::shipped::file("lathe.pcad").unwrap();
+    let text = pcadlang_library::shipped::file("lathe.pcad").unwrap();
     let (model, plan) = text.split_once("infer {").unwrap();
     let (from, _) = plan.split_once("from = ").unwrap().1.split_once("));").unwrap();
     let starts =
@@ -259,7 +259,7 @@ fn people_in_photographs() {
     assert_session("detect", &text);
     for (file, found) in [("people.json", 1), ("mediapipe.json", 1), ("nobody.json", 0)] {
         let bytes = std::fs::read(f.path().join(file)).unwrap();
-        let people = pcadlang::vision::keypoints::People::parse(&bytes).unwrap();
+        let people = pcadlang_scene::vision::keypoints::People::parse(&bytes).unwrap();
         let points = people.pick(None, None).map_or(0, |k| k.in_image(344, 425).points().len());
         assert_eq!(points > 16, found == 1, "{file}: {points}");
     }

@@ -181,7 +181,7 @@ fn surfaces_and_joints_are_scored() {
         (if left > 0.0 { 8.0 - left.sqrt() } else { 0.0 }) as f32
     };
     let depth: Vec<f32> = (0..48 * 32).map(pixel).collect();
-    f.write("cases/ball/depth.npy", pcadlang::vision::npy::f32_array(&[32, 48], depth));
+    f.write("cases/ball/depth.npy", pcadlang_scene::vision::npy::f32_array(&[32, 48], depth));
     f.write("s.json", r#"{"base": {"chains": 2}, "vary": {"tries": [5, 400]}}"#);
     let done = f.run(&["tradeoff", "ball.pcad", "--cases", "cases", "--settings", "s.json"]);
     assert_eq!(done.code, 0, "{}", done.err);

@@ -2,8 +2,8 @@
 //! chains without interruption.
 
 use pcadlang::Model;
-use pcadlang::infer::draws::{Column, DrawRow, Sink};
-use pcadlang::infer::{Checkpoint, Progress, RunOptions};
+use pcadlang_inference::draws::{Column, DrawRow, Sink};
+use pcadlang_inference::{Checkpoint, Progress, RunOptions};
 use std::io;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};

@@ -1,6 +1,6 @@
 //! Distributions by name and parameters, for tables of reference values (`tests/data`).
 
-use pcadlang::dist::*;
+use pcadlang_numerics::dist::*;
 
 /// Returns the distribution of a family, with its parameters in the order of the tables
 /// of reference values.

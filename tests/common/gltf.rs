@@ -1,7 +1,7 @@
 //! A small writer of glTF files for tests.
 
 use glam::{DMat3, DVec3};
-use pcadlang::geom::armature::Armature;
+use pcadlang_scene::geom::armature::Armature;
 use serde_json::{Value, json};
 
 /// Bytes with their buffer views and accessors, one view per accessor.

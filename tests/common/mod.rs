@@ -23,7 +23,7 @@ pub mod snapshots;
 pub mod tape;
 
 use pcadlang::Model;
-use pcadlang::infer::{Latent, Neighbours, RunOptions};
+use pcadlang_inference::{Latent, Neighbours, RunOptions};
 use std::collections::BTreeMap;
 
 /// Draws by column, with the chains concatenated.

@@ -1,8 +1,8 @@
 //! Compares the tape of a trace's density with proposals in the trace and with reverse
 //! passes through it.
 
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace::{Change, Draws, Recording, Target, Trace};
+use pcadlang_engine::trace::{Change, Draws, Recording, Target, Trace};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
 
 /// The outcome of a comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

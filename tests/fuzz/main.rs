@@ -16,8 +16,8 @@ use base64::prelude::{BASE64_STANDARD, Engine as _};
 use common::{folder, gltf};
 use image::{DynamicImage, GrayImage, ImageFormat, Luma, RgbImage, RgbaImage};
 use pcadlang::Program;
-use pcadlang::bank::{Features, Learn, learn};
-use pcadlang::vision::npy;
+use pcadlang_scene::vision::npy;
+use pcadlang_workbench::bank::{Features, Learn, learn};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -284,9 +284,9 @@ fn changed(seed: &[u8], x: &mut u64) -> Vec<u8> {
 /// beyond the first check.
 #[test]
 fn seeds() {
-    use pcadlang::geom::{FileFrame, gltf::load, obj};
-    use pcadlang::render::Camera;
-    use pcadlang::vision::{Limits, depth, keypoints::People, photo};
+    use pcadlang_scene::geom::{FileFrame, gltf::load, obj};
+    use pcadlang_scene::render::Camera;
+    use pcadlang_scene::vision::{Limits, depth, keypoints::People, photo};
     for (name, target) in TARGETS {
         let all = seeds_of(name);
         assert!(!all.is_empty(), "{name}");
@@ -304,9 +304,9 @@ fn seeds() {
                 "array" => depth::decode(seed, 1.0, &Limits::default()).is_ok(),
                 "camera" => Camera::from_json(text()).is_ok(),
                 "keypoints" => People::parse(seed).is_ok(),
-                "network" => pcadlang::nn::Network::read(seed).is_ok(),
-                "forest" => pcadlang::vision::Forest::read(seed).is_ok(),
-                "checkpoint" => pcadlang::infer::Checkpoint::from_bytes(seed).is_ok(),
+                "network" => pcadlang_detectors::nn::Network::read(seed).is_ok(),
+                "forest" => pcadlang_scene::vision::Forest::read(seed).is_ok(),
+                "checkpoint" => pcadlang_inference::Checkpoint::from_bytes(seed).is_ok(),
                 _ => true,
             };
             assert!(good, "a seed of {name} is refused: {}", String::from_utf8_lossy(seed));

@@ -3,10 +3,10 @@
 //! the rest of the state is not adaptation.
 
 use ciborium::Value;
-use pcadlang::infer::draws::{Column, DrawRow, KernelStats, Sink};
-use pcadlang::infer::{Banks, Checkpoint, Latent, Neighbours, Progress, RunOptions};
-use pcadlang::standard;
 use pcadlang::{Model, Program};
+use pcadlang_inference::draws::{Column, DrawRow, KernelStats, Sink};
+use pcadlang_inference::{Banks, Checkpoint, Latent, Neighbours, Progress, RunOptions};
+use pcadlang_library::standard;
 use std::io;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};

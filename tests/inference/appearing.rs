@@ -3,7 +3,7 @@
 //! once wrong.
 
 use crate::common::*;
-use pcadlang::infer::RunOptions;
+use pcadlang_inference::RunOptions;
 
 /// An outer condition decides whether the inner one is evaluated, and both change with
 /// `x`. The data are uninformative about `x`, so its posterior is its prior. Kernels that

@@ -9,7 +9,7 @@
 
 use crate::common::*;
 use pcadlang::Model;
-use pcadlang::infer::{Banks, RunOptions};
+use pcadlang_inference::{Banks, RunOptions};
 use std::sync::Arc;
 
 /// A model, the function that maps its states to cells, and the posterior mass of each
@@ -500,7 +500,7 @@ fn parameters_and_data_by_turns() {
 /// Simulation-based calibration (Talts et al. 2018): for parameters drawn from the prior
 /// and data drawn given them, the rank of a parameter among posterior draws is uniform.
 fn calibrated(runs: usize) {
-    use pcadlang::rng::{Purpose, StreamKey};
+    use pcadlang_numerics::rng::{Purpose, StreamKey};
     let (bins, thinned) = (8usize, 63usize);
     let mut counts = [vec![0.0; bins], vec![0.0; bins]];
     for r in 0..runs as u64 {

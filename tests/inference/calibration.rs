@@ -9,13 +9,13 @@
 use crate::common::folder::Folder;
 use crate::common::kernels::{CALIBRATED, RANKED, RANKED_ON_COUNTS};
 use crate::common::wrong_neighbours;
-use pcadlang::infer::calibration::{PlanSampler, Settings, geweke, sbc};
-use pcadlang::infer::{Progress, RunOptions};
-use pcadlang::lang::value::Value;
-use pcadlang::scene::{DepthValue, ImageValue, KeypointsValue, MaskValue};
-use pcadlang::vision::keypoints::Keypoint;
-use pcadlang::vision::{DepthMap, Keypoints, Mask, Photo};
 use pcadlang::{Model, Program};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_inference::calibration::{PlanSampler, Settings, geweke, sbc};
+use pcadlang_inference::{Progress, RunOptions};
+use pcadlang_library::scene::{DepthValue, ImageValue, KeypointsValue, MaskValue};
+use pcadlang_scene::vision::keypoints::Keypoint;
+use pcadlang_scene::vision::{DepthMap, Keypoints, Mask, Photo};
 use std::sync::Arc;
 
 /// Which of the two checks, with the number of data sets or chains, and the steps of each

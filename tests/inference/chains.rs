@@ -1,9 +1,9 @@
 //! Chains of one run: spread over calls, and paused.
 
-use pcadlang::infer::draws::Sink;
-use pcadlang::infer::{Callbacks, Progress};
-use pcadlang::report::Memory;
 use pcadlang::{Model, RunOptions};
+use pcadlang_inference::draws::Sink;
+use pcadlang_inference::{Callbacks, Progress};
+use pcadlang_report::Memory;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

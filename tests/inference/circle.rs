@@ -6,13 +6,13 @@
 //! and their weights, with a renderer inside.
 
 use crate::common::*;
-use pcadlang::dist::Datum;
-use pcadlang::infer::RunOptions;
-use pcadlang::lang::value::Value;
-use pcadlang::scene::ImageValue;
-use pcadlang::trace::{Change, Draws as Streams, Target};
-use pcadlang::vision::ContourMap;
 use pcadlang::{Model, Program};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Change, Draws as Streams, Target};
+use pcadlang_inference::RunOptions;
+use pcadlang_library::scene::ImageValue;
+use pcadlang_numerics::dist::Datum;
+use pcadlang_scene::vision::ContourMap;
 
 /// The prior box of x, y and r, in scene units; a pixel is 4.4 / 48 = 0.092 units.
 const BOX: [(f64, f64); 3] = [(-0.1, 0.5), (-0.5, 0.1), (0.6, 1.2)];
@@ -107,7 +107,7 @@ fn by_grid(model: &Model, n: usize) -> [(f64, f64); 3] {
     })
 }
 
-fn find(trace: &pcadlang::trace::Trace, name: &str) -> Target {
+fn find(trace: &pcadlang_engine::trace::Trace, name: &str) -> Target {
     let (address, ..) = trace.choices().into_iter().find(|c| c.0.to_string() == name).unwrap();
     trace.find(&address).unwrap()
 }

@@ -508,7 +508,7 @@ fn particles_give_the_evidence() {
         "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2; infer {{ repeat 1500 {{ {kernel}; collect x; }} }}"
     ))
     .unwrap_or_else(|e| panic!("{e}"));
-    let options = pcadlang::infer::RunOptions { seed: 2, ..Default::default() };
+    let options = pcadlang_inference::RunOptions { seed: 2, ..Default::default() };
     let posterior = model.run(&options, 2, 2).unwrap_or_else(|e| panic!("{e}"));
     let x =
         posterior.scalars().into_iter().find(|(n, _)| n == "x").map(|(_, x)| x).unwrap_or_default();

@@ -1,12 +1,12 @@
 //! What runs gather besides draws: the best state, evidence of modes, kept states, the way
 //! from the prior, statistics of sites; all of it comes back from checkpoints.
 
-use pcadlang::infer::draws::SiteStats;
-use pcadlang::infer::{
+use pcadlang::{Model, RunOptions};
+use pcadlang_engine::trace::Trace;
+use pcadlang_inference::draws::SiteStats;
+use pcadlang_inference::{
     BestSoFar, Callback, Evidence, KeptTraces, Progress, Trajectory, TrajectoryState, Weighed,
 };
-use pcadlang::trace::Trace;
-use pcadlang::{Model, RunOptions};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 

@@ -2,13 +2,13 @@
 //! and a surrogate avoids evaluations of its observation.
 
 use pcadlang::Model;
-use pcadlang::host::Datum;
-use pcadlang::infer::{
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Change, Draws, Pattern, Selector, Trace};
+use pcadlang_inference::host::Datum;
+use pcadlang_inference::{
     Abc, Delayed, Drift, Kernel, Mh, Pick, SiteSelection, Smc, StepContext, Temper,
 };
-use pcadlang::lang::value::Value;
-use pcadlang::syntax::span::Span;
-use pcadlang::trace::{Change, Draws, Pattern, Selector, Trace};
+use pcadlang_syntax::span::Span;
 
 fn scope() -> SiteSelection {
     SiteSelection { selector: Selector::All, pick: Pick::All }

@@ -5,7 +5,7 @@
 //! `REGENERATE=1 cargo test --release --test inference -- kernels::` rewrites both.
 
 use crate::common::kernels::PROOFS;
-use pcadlang::standard;
+use pcadlang_library::standard;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 

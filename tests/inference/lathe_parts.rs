@@ -2,13 +2,13 @@
 //! probabilities by quadrature over the same pictures.
 
 use crate::common::{assert_mean, integrate};
-use pcadlang::lang::value::Value;
-use pcadlang::render::Camera;
-use pcadlang::scene::{ImageValue, ViewValue};
-use pcadlang::shipped;
-use pcadlang::trace::{Draws, Trace};
-use pcadlang::vision::ContourMap;
 use pcadlang::{Model, Program, RunOptions};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Draws, Trace};
+use pcadlang_library::scene::{ImageValue, ViewValue};
+use pcadlang_library::shipped;
+use pcadlang_scene::render::Camera;
+use pcadlang_scene::vision::ContourMap;
 
 const SIZE: u32 = 48;
 

@@ -2,16 +2,16 @@
 //! and programs that cannot be simulated are refused with the reason.
 
 use pcadlang::Model;
-use pcadlang::dist::Datum;
-use pcadlang::infer::calibration::{
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Change, Selector, Trace, TraceResult};
+use pcadlang_inference::calibration::{
     CalibrationError, KernelSampler, PlanSampler, Settings, geweke, sbc,
 };
-use pcadlang::infer::{
+use pcadlang_inference::{
     Kernel, Mh, Outcome, Pick, Progress, RunOptions, SiteSelection, StepContext,
 };
-use pcadlang::lang::value::Value;
-use pcadlang::rng::Stream;
-use pcadlang::trace::{Change, Selector, Trace, TraceResult};
+use pcadlang_numerics::dist::Datum;
+use pcadlang_numerics::rng::Stream;
 
 const GAMMA: &str = "assume s ~ gamma(3, 3); observe poisson(4 * s) = [2, 3] as n;";
 

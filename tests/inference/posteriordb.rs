@@ -3,10 +3,10 @@
 //! `cargo test --release --test inference posteriordb:: -- --include-ignored --nocapture`
 //! prints times.
 
-use pcadlang::infer::RunOptions;
-use pcadlang::infer::diagnostics::{ess_bulk, ess_mean, mcse_mean, r_hat};
-use pcadlang::lang::value::Value;
 use pcadlang::{Model, Program};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_inference::RunOptions;
+use pcadlang_inference::diagnostics::{ess_bulk, ess_mean, mcse_mean, r_hat};
 use serde_json::Value as Json;
 use std::path::Path;
 

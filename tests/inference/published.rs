@@ -2,11 +2,11 @@
 //! truncation, flat priors on half-lines, ordering with different priors, explicit
 //! mixtures.
 
-use pcadlang::infer::diagnostics::mcse_mean;
-use pcadlang::lang::value::Value;
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace::Draws;
 use pcadlang::{Model, Program, RunOptions};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::Draws;
+use pcadlang_inference::diagnostics::mcse_mean;
+use pcadlang_numerics::rng::{Purpose, StreamKey};
 
 /// Returns the log joint density of a program at these values.
 fn log_joint(model: &Model, values: &[(&str, f64)]) -> f64 {

@@ -4,8 +4,8 @@
 
 use crate::common::{breaks, programs};
 use breaks::same_after_breaks;
-use pcadlang::infer::RunOptions;
 use pcadlang::{Model, Program};
+use pcadlang_inference::RunOptions;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 

@@ -7,9 +7,9 @@
 
 use ciborium::Value as Cbor;
 use pcadlang::Model;
-use pcadlang::infer::{Hmc, Kernel, Nuts, Pick, SiteSelection, Slice, StepContext};
-use pcadlang::lang::value::Value;
-use pcadlang::trace::{Draws, Selector, Trace};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Draws, Selector, Trace};
+use pcadlang_inference::{Hmc, Kernel, Nuts, Pick, SiteSelection, Slice, StepContext};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 /// The probability that a correct kernel fails a test.

@@ -4,7 +4,8 @@
 //! `REGENERATE=1 cargo test --release --test language -- docs::` rewrites the reference.
 
 use pcadlang::{Model, RunOptions};
-use pcadlang::{lang::builtins::doc, standard};
+use pcadlang_engine::lang::builtins::doc;
+use pcadlang_library::standard;
 
 const START: &str = "<!-- reference: generated from the table of built-ins -->\n";
 

@@ -2,9 +2,9 @@
 //! a program whose names are changed everywhere still compiles to the same code.
 
 use pcadlang::Program;
-use pcadlang::diag::{FileId, Span};
-use pcadlang::editor::{Analysis, BindingKind, CandidateKind, PieceKind};
-use pcadlang::standard;
+use pcadlang_library::standard;
+use pcadlang_syntax::diag::{FileId, Span};
+use pcadlang_workbench::editor::{Analysis, BindingKind, CandidateKind, PieceKind};
 use std::path::{Path, PathBuf};
 
 /// The shipped programs and the examples that have no mistakes.
@@ -221,8 +221,8 @@ fn hovering_explains() {
 /// The grammar by which editors colour programs before the server has answered.
 #[test]
 fn the_textmate_grammar_has_the_keywords_of_the_language() {
-    use pcadlang::editor::words::KEYWORDS;
-    use pcadlang::syntax::{Class, STATEMENTS, classes};
+    use pcadlang_syntax::{Class, STATEMENTS, classes};
+    use pcadlang_workbench::editor::words::KEYWORDS;
     let text = include_str!("../../editors/vscode/syntaxes/pcad.tmLanguage.json");
     let grammar: serde_json::Value = serde_json::from_str(text).unwrap();
     let patterns = grammar["repository"]["words"]["patterns"].as_array().unwrap();

@@ -10,9 +10,9 @@
 //! subfolders are there to be included.
 
 use crate::common::snapshots;
-use pcadlang::diag::{Diagnostic, IntoDiagnostic, SourceMap, render};
-use pcadlang::syntax::parse;
 use pcadlang::{Error, Program, RunOptions};
+use pcadlang_syntax::diag::{Diagnostic, IntoDiagnostic, SourceMap, render};
+use pcadlang_syntax::parse;
 use std::path::Path;
 
 /// Returns the errors of the program at a path in some phase.

@@ -3,21 +3,21 @@
 
 use crate::common::folder::{Folder, disc, png};
 use crate::forests;
-use pcadlang::bank::as_view;
-use pcadlang::lang::builtins::Builtin;
-use pcadlang::lang::builtins::examples::INCLUDE;
-use pcadlang::lang::value::Value;
-use pcadlang::standard;
-use pcadlang::syntax::format;
-use pcadlang::trace::Draws;
 use pcadlang::{Model, Program, RunOptions};
+use pcadlang_engine::lang::builtins::Builtin;
+use pcadlang_engine::lang::builtins::examples::INCLUDE;
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::Draws;
+use pcadlang_library::standard;
+use pcadlang_syntax::format;
+use pcadlang_workbench::bank::as_view;
 
 /// Writes the files that examples read.
 fn files() -> Folder {
     let f = Folder::new("examples");
     let ball = png(disc(64, 64, 32.0, 32.0, 15.0));
     f.write("ball.png", &ball).write("mask.png", &ball);
-    f.write("depth.npy", pcadlang::vision::npy::f32_array(&[32, 32], [7.0; 32 * 32]));
+    f.write("depth.npy", pcadlang_scene::vision::npy::f32_array(&[32, 32], [7.0; 32 * 32]));
     f.write("model.yml.gz", forests::gzip(forests::small().yaml().as_bytes()));
     f.write("person.json", include_str!("../../examples/images/skier.keypoints.json"));
     f.succeeds(&["contours", "ball.png", "-o", "contours.png"]);
@@ -27,7 +27,7 @@ fn files() -> Folder {
         std::fs::create_dir_all(f.path().join(folder)).unwrap();
     }
     for name in SHIPPED {
-        f.write(name, pcadlang::shipped::file(name).unwrap());
+        f.write(name, pcadlang_library::shipped::file(name).unwrap());
     }
     f
 }

@@ -1,11 +1,11 @@
 //! Programs that would exceed the available memory, stack or time: an error with its
 //! position and a remedy.
 
-use pcadlang::infer::Progress;
-use pcadlang::lang::value::Value;
-use pcadlang::report::Memory;
-use pcadlang::trace::{Draws, Limits, Stop};
 use pcadlang::{Model, Program, RunOptions};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Draws, Limits, Stop};
+use pcadlang_inference::Progress;
+use pcadlang_report::Memory;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};

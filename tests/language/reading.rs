@@ -3,7 +3,7 @@
 
 use crate::common::folder::{Folder, disc, png};
 use pcadlang::Program;
-use pcadlang::lang::value::Value;
+use pcadlang_engine::lang::value::Value;
 
 const CHECK: [&str; 2] = ["check", "own/p.pcad"];
 const OUTSIDE: &str = "it is outside the folders that the program may read";

@@ -4,13 +4,13 @@
 #![allow(dead_code)]
 
 use crate::common::folder::Folder;
-use pcadlang::host::{Entry, Host, Previous, Type};
-use pcadlang::infer::{
+use pcadlang::{Error, Model, Posterior, Program, RunOptions, Value};
+use pcadlang_engine::trace::{Change, Draws, Selector, Trace};
+use pcadlang_inference::host::{Entry, Host, Previous, Type};
+use pcadlang_inference::{
     Callbacks, Drift, Kernel, Mh, Pick, Progress, SiteSelection, Slice, StepContext,
 };
-use pcadlang::report::{Memory, RunDir};
-use pcadlang::trace::{Change, Draws, Selector, Trace};
-use pcadlang::{Error, Model, Posterior, Program, RunOptions, Value};
+use pcadlang_report::{Memory, RunDir};
 use std::sync::atomic::Ordering;
 
 #[path = "../../examples/embed_distribution.rs"]
@@ -183,14 +183,15 @@ fn a_kernel_of_the_host_applies_another() {
             &mut self,
             trace: &mut Trace,
             at: &StepContext,
-        ) -> pcadlang::trace::TraceResult<pcadlang::infer::Outcome> {
+        ) -> pcadlang_engine::trace::TraceResult<pcadlang_inference::Outcome> {
             let mut all = self.0.step(trace, &at.within(0))?;
             all.add(self.0.step(trace, &at.within(1))?);
             Ok(all)
         }
     }
-    let twice =
-        Entry::kernel("twice", |call: &mut pcadlang::host::KernelCall| Ok(Twice(call.kernel(0)?)));
+    let twice = Entry::kernel("twice", |call: &mut pcadlang_inference::host::KernelCall| {
+        Ok(Twice(call.kernel(0)?))
+    });
     let host = Host::new().with(twice.argument("move", Type::Kernel, "The inner kernel."));
     let text = "assume x ~ normal(0, 1); observe normal(x, 1) = 1; infer { repeat 100 { twice(mh(@x)); } }";
     let model = Program::parse(text).unwrap().host(&host).unwrap().compile().unwrap();
@@ -278,7 +279,7 @@ fn names_that_clash_or_are_none_are_errors() {
 
 fn embedded_distribution() -> Entry {
     Entry::distribution("d", |_| {
-        Err::<pcadlang::dist::Normal, _>(pcadlang::host::Fault::domain("none"))
+        Err::<pcadlang_numerics::dist::Normal, _>(pcadlang_inference::host::Fault::domain("none"))
     })
 }
 
@@ -286,7 +287,7 @@ fn embedded_distribution() -> Entry {
 /// its type is not guessed.
 #[test]
 fn what_a_host_s_distribution_does_wrong_reaches_no_accept_test() {
-    use pcadlang::host::{Datum, Distribution, Gradient, Support};
+    use pcadlang_inference::host::{Datum, Distribution, Gradient, Support};
     #[derive(Debug)]
     struct Odd;
     impl Distribution for Odd {
@@ -296,7 +297,7 @@ fn what_a_host_s_distribution_does_wrong_reaches_no_accept_test() {
         fn support(&self) -> Support {
             Support::Vector(2)
         }
-        fn sample(&self, rng: &mut pcadlang::rng::Stream) -> Datum {
+        fn sample(&self, rng: &mut pcadlang_numerics::rng::Stream) -> Datum {
             vec![rng.uniform() - 0.5, rng.uniform()].into()
         }
         /// The square root of a number that may be negative.
@@ -323,8 +324,8 @@ fn what_a_host_s_distribution_does_wrong_reaches_no_accept_test() {
 /// `knn` draws such a value from its prior.
 #[test]
 fn neighbours_do_not_move_what_is_in_part_discrete() {
-    use pcadlang::host::{Datum, Distribution, Gradient, Support};
-    use pcadlang::infer::{Knn, Latent, Neighbours};
+    use pcadlang_inference::host::{Datum, Distribution, Gradient, Support};
+    use pcadlang_inference::{Knn, Latent, Neighbours};
     /// A standard normal number, and 0 or 1.
     #[derive(Debug)]
     struct Toss;
@@ -335,7 +336,7 @@ fn neighbours_do_not_move_what_is_in_part_discrete() {
         fn support(&self) -> Support {
             Support::Each([Support::Real, Support::Integers { lo: 0, hi: Some(1) }].into())
         }
-        fn sample(&self, rng: &mut pcadlang::rng::Stream) -> Datum {
+        fn sample(&self, rng: &mut pcadlang_numerics::rng::Stream) -> Datum {
             vec![rng.standard_normal(), rng.index(2) as f64].into()
         }
         fn log_density(&self, x: &Datum) -> f64 {

@@ -1,7 +1,7 @@
 //! The diagnostics compared with ArviZ's numbers on stored draws (made by
 //! `data/arviz_summary.py`).
 
-use pcadlang::infer::diagnostics::{
+use pcadlang_inference::diagnostics::{
     ess_bulk, ess_mean, ess_quantile, ess_tail, mcse_mean, mcse_sd, r_hat, summary,
 };
 use serde::Deserialize;

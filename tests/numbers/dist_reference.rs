@@ -6,8 +6,8 @@
 //! size 1 to 100 have cancelled.
 
 use crate::common::families::{datum, made};
-use pcadlang::dist::*;
-use pcadlang::num;
+use pcadlang_numerics::dist::*;
+use pcadlang_numerics::num;
 
 const TABLE: &str = include_str!("../data/dist_reference.csv");
 

@@ -3,7 +3,7 @@
 
 use crate::common::*;
 use pcadlang::Model;
-use pcadlang::infer::RunOptions;
+use pcadlang_inference::RunOptions;
 
 fn error(text: &str) -> String {
     let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));

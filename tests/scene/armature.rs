@@ -6,9 +6,9 @@
 
 use crate::subjects::shipped;
 use glam::{DAffine3, DVec3};
-use pcadlang::geom::Affine;
-use pcadlang::geom::armature::{Armature, JointPose, Posed, Rules, Stretch, Turn};
-use pcadlang::render::{Camera, Contours, View};
+use pcadlang_scene::geom::Affine;
+use pcadlang_scene::geom::armature::{Armature, JointPose, Posed, Rules, Stretch, Turn};
+use pcadlang_scene::render::{Camera, Contours, View};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -40,7 +40,7 @@ fn plain(body: &Armature, pose: &[JointPose]) -> Vec<DVec3> {
             * DAffine3::from_translation(-j.head);
         m.push(j.parent.map_or(own, |up| m[up] * own));
     }
-    let moved = |(p, i): (&glam::Vec3, &pcadlang::geom::armature::Influence)| {
+    let moved = |(p, i): (&glam::Vec3, &pcadlang_scene::geom::armature::Influence)| {
         (0..4)
             .map(|k| {
                 m[usize::from(i.joints[k])].transform_point3(p.as_dvec3()) * f64::from(i.weights[k])
@@ -98,7 +98,7 @@ fn a_pose_that_differs_in_one_joint_shares_all_other_parts() {
     let mut other = pose.clone();
     other[hand] = JointPose::turned(DVec3::new(0.5, 0.2, 0.1));
     let (after, _) = body.posed_after(&other, &rules, Some(&posed)).unwrap();
-    let moved = |a: &pcadlang::geom::Solid, b: &pcadlang::geom::Solid| {
+    let moved = |a: &pcadlang_scene::geom::Solid, b: &pcadlang_scene::geom::Solid| {
         a.instances()
             .iter()
             .zip(b.instances())

@@ -6,9 +6,9 @@
 
 use crate::common::folder::Folder;
 use glam::DVec3;
-use pcadlang::geom::armature::autorig;
-use pcadlang::geom::obj;
-use pcadlang::shipped;
+use pcadlang_library::shipped;
+use pcadlang_scene::geom::armature::autorig;
+use pcadlang_scene::geom::obj;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 

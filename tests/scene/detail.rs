@@ -9,10 +9,10 @@
 //! contours, not with the distance that anything moved.
 
 use crate::subjects;
-use pcadlang::geom::Solid;
-use pcadlang::render::{Camera, Contours, View};
-use pcadlang::vision::ContourMap;
-use pcadlang::vision::chamfer::{Chamfer, ChamferOptions};
+use pcadlang_scene::geom::Solid;
+use pcadlang_scene::render::{Camera, Contours, View};
+use pcadlang_scene::vision::ContourMap;
+use pcadlang_scene::vision::chamfer::{Chamfer, ChamferOptions};
 use std::sync::Arc;
 use subjects::Subject;
 
@@ -62,9 +62,9 @@ fn the_score_is_off_by_no_more_than_the_detail_allows() {
 /// drawn before or on which thread.
 #[test]
 fn the_level_depends_on_the_state_and_not_on_the_way_there() {
-    use pcadlang::lang::value::Value;
-    use pcadlang::scene::{ImageValue, ViewValue};
-    use pcadlang::trace::{Draws, Trace};
+    use pcadlang_engine::lang::value::Value;
+    use pcadlang_engine::trace::{Draws, Trace};
+    use pcadlang_library::scene::{ImageValue, ViewValue};
     let text = "include \"std/scene.pcad\" as scene;
          data photo: image \"contours\";
          for k in [\"x\", \"z\"] { t[k] ~ uniform(-12, 4); }

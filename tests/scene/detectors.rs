@@ -2,11 +2,11 @@
 
 use crate::common::folder::{Folder, disc, png};
 use crate::forests;
-use pcadlang::lang::value::Value;
-use pcadlang::scene::{DetectorValue, ImageValue};
-use pcadlang::trace::Draws;
-use pcadlang::vision::{FileDetector, NetworkOptions, Photo};
 use pcadlang::{Model, Program};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::Draws;
+use pcadlang_library::scene::{DetectorValue, ImageValue};
+use pcadlang_scene::vision::{FileDetector, NetworkOptions, Photo};
 
 const PROGRAM: &str = "
 include \"std/scene.pcad\" as scene;
@@ -94,9 +94,11 @@ fn a_run_has_a_detector_where_the_program_names_none() {
     // The photograph itself, and one given by a host; the given value does not change
     // once its contours have been computed.
     assert_eq!(contours(&chosen, "photo"), by_trees);
-    let grey =
-        pcadlang::vision::photo::decode(&png(disc(96, 96, 48.0, 48.0, 24.0)), &Default::default())
-            .unwrap();
+    let grey = pcadlang_scene::vision::photo::decode(
+        &png(disc(96, 96, 48.0, 48.0, 24.0)),
+        &Default::default(),
+    )
+    .unwrap();
     let given = Value::object(ImageValue::photo(Photo::from_rgb(grey.rgb().clone()).unwrap()));
     let before = seen(&given);
     let model =

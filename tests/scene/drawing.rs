@@ -3,8 +3,8 @@
 //! before.
 
 use glam::{DVec3, Vec3};
-use pcadlang::geom::{Affine, Mesh, Solid};
-use pcadlang::render::{Camera, Channels, Contours, Frame, Projection, View};
+use pcadlang_scene::geom::{Affine, Mesh, Solid};
+use pcadlang_scene::render::{Camera, Channels, Contours, Frame, Projection, View};
 use std::cell::RefCell;
 use std::sync::Arc;
 

@@ -7,10 +7,10 @@ use crate::common::gltf as files;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use files::{Writer, glb, skinned};
 use glam::{DMat3, DVec3, Vec3};
-use pcadlang::geom::armature::{Armature, JointPose, Rules, rig_from_json};
-use pcadlang::geom::gltf::{Loaded, load};
-use pcadlang::geom::{FileFrame, Mesh, UpAxis, cuboid, glb as glb_file, obj, sphere};
-use pcadlang::shipped;
+use pcadlang_library::shipped;
+use pcadlang_scene::geom::armature::{Armature, JointPose, Rules, rig_from_json};
+use pcadlang_scene::geom::gltf::{Loaded, load};
+use pcadlang_scene::geom::{FileFrame, Mesh, UpAxis, cuboid, glb as glb_file, obj, sphere};
 use serde_json::{Value, json};
 
 fn none(path: &str) -> Result<Vec<u8>, String> {
@@ -78,7 +78,7 @@ fn the_shipped_body_comes_back_and_moves_alike() {
         assert_eq!(rig.joints().len(), known.joints().len());
         for j in known.joints() {
             let found = &rig.joints()[rig.find(&j.name).unwrap()];
-            let name = |rig: &pcadlang::geom::armature::Rig, j: Option<usize>| {
+            let name = |rig: &pcadlang_scene::geom::armature::Rig, j: Option<usize>| {
                 j.map(|p| rig.joints()[p].name.clone())
             };
             assert!(

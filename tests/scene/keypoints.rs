@@ -2,13 +2,13 @@
 
 use crate::common::folder::{Folder, disc, png};
 use crate::common::snapshots::assert_session;
-use pcadlang::lang::value::Value;
-use pcadlang::scene::{ImageValue, KeypointsValue};
-use pcadlang::vision::Photo;
-use pcadlang::vision::keypoints::{
+use pcadlang::{Model, Program, RunOptions};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_library::scene::{ImageValue, KeypointsValue};
+use pcadlang_scene::vision::Photo;
+use pcadlang_scene::vision::keypoints::{
     Detection, Keypoint, KeypointLikelihood, KeypointOptions, Keypoints, People,
 };
-use pcadlang::{Model, Program, RunOptions};
 
 /// A bar with two landmarks at its ends, which moves in the picture plane.
 const BAR: &str = "include \"std/scene.pcad\" as scene;
@@ -27,7 +27,7 @@ fn picture() -> Vec<u8> {
 }
 
 fn photo() -> Value {
-    let photo = pcadlang::vision::photo::decode(&picture(), &Default::default());
+    let photo = pcadlang_scene::vision::photo::decode(&picture(), &Default::default());
     let photo: Photo = photo.unwrap();
     Value::object(ImageValue::photo(photo))
 }
@@ -341,8 +341,10 @@ fn the_people_of_the_development_pictures_are_found_by_their_files() {
         return;
     }
     let f = Folder::new("keypoints_development");
-    let joints: Vec<String> =
-        pcadlang::vision::keypoints::COCO[5..].iter().map(|n| format!("{n}: [0, 0, 0]")).collect();
+    let joints: Vec<String> = pcadlang_scene::vision::keypoints::COCO[5..]
+        .iter()
+        .map(|n| format!("{n}: [0, 0, 0]"))
+        .collect();
     f.write(
         "p.pcad",
         format!(

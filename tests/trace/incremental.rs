@@ -4,7 +4,7 @@
 
 use crate::common::{programs, tape};
 use pcadlang::Program;
-use pcadlang::infer::RunOptions;
+use pcadlang_inference::RunOptions;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 

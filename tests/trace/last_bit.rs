@@ -3,11 +3,11 @@
 //! from a choice to a score, incremental updates are compared with running the whole
 //! program.
 
-use pcadlang::host::{Entry, Host, Previous, Type};
-use pcadlang::infer::RunOptions;
-use pcadlang::lang::value::Value;
-use pcadlang::trace::{Draws, Trace};
 use pcadlang::{Model, Program};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Draws, Trace};
+use pcadlang_inference::RunOptions;
+use pcadlang_inference::host::{Entry, Host, Previous, Type};
 
 /// Amplifies a unit in the last place at 0.3, and the sign of 0.
 const FAR: &str = "fn far(v) { clamp((v - 0.3) * 1e17, -40, 40) + atan2(0, v) }

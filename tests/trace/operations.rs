@@ -3,9 +3,9 @@
 
 use crate::common::{mean, normal_pdf, variance};
 use pcadlang::Model;
-use pcadlang::lang::value::Value;
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace::{Address, Draws, Given, Selector, Trace};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Address, Draws, Given, Selector, Trace};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
 
 fn trace(text: &str) -> Trace {
     let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
@@ -170,7 +170,7 @@ fn projections_sum_to_the_joint() {
     let mut t = trace(&format!("{MANY} factor(-m * m);"));
     let address = |text: &str| {
         let a: Address = text.parse().unwrap();
-        Selector::Address(pcadlang::trace::Pattern::exact(&a))
+        Selector::Address(pcadlang_engine::trace::Pattern::exact(&a))
     };
     for step in 0..20 {
         let all = t.select(&Selector::All);
@@ -187,8 +187,10 @@ fn projections_sum_to_the_joint() {
             sum += one;
         }
         assert!((sum - t.log_joint()).abs() < 1e-9);
-        let kinds =
-            [pcadlang::trace::ChoiceKind::Continuous, pcadlang::trace::ChoiceKind::Discrete];
+        let kinds = [
+            pcadlang_engine::trace::ChoiceKind::Continuous,
+            pcadlang_engine::trace::ChoiceKind::Discrete,
+        ];
         let prior: f64 = kinds.map(|k| t.project(&Selector::Kind(k))).iter().sum();
         assert!((prior - t.log_prior()).abs() < 1e-9, "observations have no kinds");
     }

@@ -3,10 +3,10 @@
 //! conditions, structure or other choices.
 
 use crate::common::tape;
-use pcadlang::dist::Datum;
-use pcadlang::lang::value::Value;
-use pcadlang::trace::{Change, Draws, Trace};
 use pcadlang::{Model, Program};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Change, Draws, Trace};
+use pcadlang_numerics::dist::Datum;
 use serde_json::Value as Json;
 use std::path::Path;
 use tape::compare_tape;

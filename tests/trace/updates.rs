@@ -3,9 +3,9 @@
 
 use crate::common::*;
 use pcadlang::Model;
-use pcadlang::infer::RunOptions;
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace::{Change, Draws as Streams, Limits, Selector, Trace};
+use pcadlang_engine::trace::{Change, Draws as Streams, Limits, Selector, Trace};
+use pcadlang_inference::RunOptions;
+use pcadlang_numerics::rng::{Purpose, StreamKey};
 
 fn trace(text: &str, seed: u64) -> (Model, Trace) {
     let model = Model::from_text(text).unwrap_or_else(|e| panic!("{e}"));
@@ -271,7 +271,7 @@ fn a_change_reruns_only_what_depends_on_it() {
     let (_, mut t) = trace(text, 1);
     let a = t.find(&t.choices()[0].0).unwrap();
     t.record_execution();
-    t.propose(&[(a, Change::Set(pcadlang::dist::Datum::Num(0.25)))], at(1)).unwrap();
+    t.propose(&[(a, Change::Set(pcadlang_numerics::dist::Datum::Num(0.25)))], at(1)).unwrap();
     let ran: Vec<&str> =
         t.executed().iter().map(|s| &text[s.start as usize..s.end as usize]).collect();
     t.commit();
@@ -290,7 +290,7 @@ fn a_change_reruns_only_what_depends_on_it() {
 /// without executing anything.
 #[test]
 fn moves_are_seen_by_who_watches() {
-    use pcadlang::infer::{Gibbs, Kernel, Pick, SiteSelection, StepContext};
+    use pcadlang_inference::{Gibbs, Kernel, Pick, SiteSelection, StepContext};
     let (_, mut t) =
         trace("assume f ~ flip(0.5); observe normal(if f { 1 } else { 0 }, 1) = 0.5;", 1);
     let mut kernel = Gibbs::new(SiteSelection { selector: Selector::All, pick: Pick::One });
@@ -317,9 +317,9 @@ fn work_does_not_grow_with_the_trace() {
             "assume m ~ normal(0, 1); for i in 0 .. {n} {{ z[i] ~ flip(0.3); observe normal(if z[i] {{ m }} else {{ 0 }}, 1) = 1; }}"
         );
         let (_, mut t) = trace(&text, 1);
-        let all = t.select(&Selector::Kind(pcadlang::trace::ChoiceKind::Discrete));
+        let all = t.select(&Selector::Kind(pcadlang_engine::trace::ChoiceKind::Discrete));
         let target = t.targets(all)[n / 2];
-        let set = |v| [(target, Change::Set(pcadlang::dist::Datum::Bool(v)))];
+        let set = |v| [(target, Change::Set(pcadlang_numerics::dist::Datum::Bool(v)))];
         t.propose(&set(true), at(3)).unwrap();
         t.commit();
         t.record_execution();
@@ -345,7 +345,7 @@ fn storage_of_branches_is_used_again() {
         Trace::simulate(model.code().clone(), at(0), limits).unwrap_or_else(|e| panic!("{e}"));
     let c = t.find(&"@c".parse().unwrap()).unwrap();
     for step in 0..1000u64 {
-        let set = [(c, Change::Set(pcadlang::dist::Datum::Bool(step % 2 == 0)))];
+        let set = [(c, Change::Set(pcadlang_numerics::dist::Datum::Bool(step % 2 == 0)))];
         t.propose(&set, at(step + 1)).unwrap_or_else(|e| panic!("step {step}: {e}"));
         if step % 5 == 0 {
             t.rollback();
@@ -360,7 +360,7 @@ fn storage_of_branches_is_used_again() {
 /// the meantime.
 #[test]
 fn what_a_map_ran_over_is_let_go() {
-    use pcadlang::dist::Datum::{Bool, Num};
+    use pcadlang_numerics::dist::Datum::{Bool, Num};
     let (_, mut t) = trace(
         "assume c ~ flip(0.5); for i in 0 .. 3 { w[i] ~ normal(0, 1); }
          assume y = if c { sum(map(fn(x) { x * 2 }, w)) } else { 0 }; observe normal(y, 1) = 1;",
@@ -396,7 +396,7 @@ fn gradients_do_not_depend_on_the_past() {
     };
     let n = t.find(&"@n".parse().unwrap()).unwrap();
     for step in 0..40u64 {
-        let set = Change::Set(pcadlang::dist::Datum::Num((step * 7 % 19) as f64));
+        let set = Change::Set(pcadlang_numerics::dist::Datum::Num((step * 7 % 19) as f64));
         t.propose(&[(n, set)], at(step)).unwrap_or_else(|e| panic!("{e}"));
         t.commit();
         let fresh = t.rerun().unwrap_or_else(|e| panic!("{e}"));
@@ -416,7 +416,7 @@ fn surrogates_are_not_part_of_the_joint() {
     assert_eq!(t.log_joint().to_bits(), plain.log_joint().to_bits());
     let y = t.observations()[0].0.clone();
     let x: f64 = match t.choices()[0].1 {
-        pcadlang::lang::value::Value::Num(x) => x,
+        pcadlang_engine::lang::value::Value::Num(x) => x,
         _ => unreachable!(),
     };
     let expected = normal_pdf(2.0, x, 3.0).ln();
@@ -476,7 +476,7 @@ fn restored_states_are_the_saved_ones() {
 /// refers to the existing choice, after accepted and rejected moves.
 #[test]
 fn choices_are_found_by_their_addresses_as_branches_change() {
-    use pcadlang::infer::{Kernel, Mh, Pick, SiteSelection, StepContext};
+    use pcadlang_inference::{Kernel, Mh, Pick, SiteSelection, StepContext};
     let model = Model::from_text(
         "assume c ~ flip(0.4);
          let f = if c { fn() { z[0] ~ normal(1, 1); z[0] } }

@@ -8,8 +8,8 @@
 //! candidates, their number, and the seconds; and finally how many folders reach 0.8 and
 //! 0.9.
 
-use pcadlang::vision::candidates::{CandidateOptions, candidates};
-use pcadlang::vision::{Limits, Mask, mask, photo};
+use pcadlang_scene::vision::candidates::{CandidateOptions, candidates};
+use pcadlang_scene::vision::{Limits, Mask, mask, photo};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

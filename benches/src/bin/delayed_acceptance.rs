@@ -17,12 +17,12 @@
 mod clock;
 
 use clock::process_seconds;
-use pcadlang::lang::value::Value;
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::scene::{ImageValue, ViewValue};
-use pcadlang::trace::Draws;
-use pcadlang::vision::ContourMap;
 use pcadlang::{Model, Program, RunOptions};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::Draws;
+use pcadlang_library::scene::{ImageValue, ViewValue};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
+use pcadlang_scene::vision::ContourMap;
 use std::error::Error;
 
 const PROGRAM: &str = r#"

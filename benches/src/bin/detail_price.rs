@@ -19,10 +19,10 @@ mod clock;
 mod subjects;
 
 use clock::processor_seconds;
-use pcadlang::geom::Solid;
-use pcadlang::render::{Camera, View};
-use pcadlang::vision::ContourMap;
-use pcadlang::vision::chamfer::{Chamfer, ChamferOptions};
+use pcadlang_scene::geom::Solid;
+use pcadlang_scene::render::{Camera, View};
+use pcadlang_scene::vision::ContourMap;
+use pcadlang_scene::vision::chamfer::{Chamfer, ChamferOptions};
 use std::error::Error;
 use subjects::Subject;
 

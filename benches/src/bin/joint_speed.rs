@@ -10,9 +10,9 @@
 mod shipped;
 
 use glam::DVec3;
-use pcadlang::geom::armature::{JointPose, Rules};
-use pcadlang::geom::{Affine, GeomError};
-use pcadlang::render::{Camera, View};
+use pcadlang_scene::geom::armature::{JointPose, Rules};
+use pcadlang_scene::geom::{Affine, GeomError};
+use pcadlang_scene::render::{Camera, View};
 use std::cell::RefCell;
 use std::time::Instant;
 

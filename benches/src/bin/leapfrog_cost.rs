@@ -8,8 +8,8 @@
 mod clock;
 
 use clock::processor_seconds;
-use pcadlang::trace::{Change, Draws, Target, Trace};
 use pcadlang::{Model, Program};
+use pcadlang_engine::trace::{Change, Draws, Target, Trace};
 use std::error::Error;
 
 /// Programs that include their data.

@@ -13,9 +13,9 @@ mod clock;
 use clock::processor_seconds;
 use image::imageops::{FilterType, resize};
 use image::{DynamicImage, GrayImage, Luma, RgbImage};
-use pcadlang::vision::chamfer::{Chamfer, ChamferOptions};
-use pcadlang::vision::features::{Query, observed};
-use pcadlang::vision::{
+use pcadlang_scene::vision::chamfer::{Chamfer, ChamferOptions};
+use pcadlang_scene::vision::features::{Query, observed};
+use pcadlang_scene::vision::{
     ContourMap, ContourRatio, ContourRatioOptions, DepthMap, GradientDetector, Limits, Mask, Photo,
     Region, RegionOptions, distance_transform, gradient, nms, photo,
 };

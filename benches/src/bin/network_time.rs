@@ -3,7 +3,7 @@
 //!
 //!     cargo run --release -p pcadlang-benches --bin network_time -- models/*.tflite
 
-use pcadlang::nn::Network;
+use pcadlang_detectors::nn::Network;
 use std::time::Instant;
 
 /// The number of timed runs.

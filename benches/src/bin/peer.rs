@@ -12,10 +12,10 @@
 mod clock;
 
 use clock::processor_seconds;
-use pcadlang::infer::{Callback, RunOptions};
-use pcadlang::lang::value::Value;
-use pcadlang::trace::{Draws, Trace};
 use pcadlang::{Model, Program};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Draws, Trace};
+use pcadlang_inference::{Callback, RunOptions};
 use serde_json::{Value as Json, json};
 use std::error::Error;
 use std::sync::Arc;

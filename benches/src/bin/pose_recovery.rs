@@ -7,11 +7,11 @@
 mod known_truth;
 
 use known_truth::{SIZE, argument, compile, draw, global, quantile, score, sorted};
-use pcadlang::infer::Callback;
-use pcadlang::scene::ViewValue;
-use pcadlang::trace::{Draws, Trace};
-use pcadlang::vision::ContourMap;
 use pcadlang::{Model, RunOptions};
+use pcadlang_engine::trace::{Draws, Trace};
+use pcadlang_inference::Callback;
+use pcadlang_library::scene::ViewValue;
+use pcadlang_scene::vision::ContourMap;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;

@@ -14,12 +14,12 @@
 //! them.
 
 use pcadlang::Program;
-use pcadlang::infer::draws::{Column, DrawRow, Sink};
-use pcadlang::infer::{Progress, RunOptions};
-use pcadlang::report::svg::Svg;
-use pcadlang::shipped;
-use pcadlang::vision::candidates::{CandidateOptions, candidates};
-use pcadlang::vision::{Limits, photo};
+use pcadlang_inference::draws::{Column, DrawRow, Sink};
+use pcadlang_inference::{Progress, RunOptions};
+use pcadlang_library::shipped;
+use pcadlang_report::svg::Svg;
+use pcadlang_scene::vision::candidates::{CandidateOptions, candidates};
+use pcadlang_scene::vision::{Limits, photo};
 use std::fmt::Write;
 use std::io;
 use std::sync::{Arc, Mutex};
@@ -44,7 +44,7 @@ impl Sink for Recorder {
         Ok(())
     }
 
-    fn resume(&mut self) -> io::Result<Option<pcadlang::infer::Checkpoint>> {
+    fn resume(&mut self) -> io::Result<Option<pcadlang_inference::Checkpoint>> {
         if let Ok(mut path) = self.0.lock() {
             path.begun = Some(Instant::now());
         }
@@ -108,7 +108,9 @@ fn paths(job: &Job, with: bool) -> Result<Vec<Vec<(f64, f64)>>, String> {
     let program = match job.camera {
         Some(path) => {
             let text = std::fs::read_to_string(path).map_err(|e| format!("{path}: {e}"))?;
-            program.camera(pcadlang::render::Camera::from_json(&text).map_err(|e| e.to_string())?)
+            program.camera(
+                pcadlang_scene::render::Camera::from_json(&text).map_err(|e| e.to_string())?,
+            )
         }
         None => program,
     };

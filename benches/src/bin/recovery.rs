@@ -7,11 +7,11 @@
 mod known_truth;
 
 use known_truth::{argument, compile, draw, global, quantile, score, sorted};
-use pcadlang::lang::value::Value;
-use pcadlang::report::Quantity;
-use pcadlang::trace::Trace;
-use pcadlang::vision::ContourMap;
 use pcadlang::{Model, RunOptions};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::Trace;
+use pcadlang_report::Quantity;
+use pcadlang_scene::vision::ContourMap;
 use std::time::Duration;
 
 /// The position of the default camera on the z axis.

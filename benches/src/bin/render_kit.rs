@@ -20,10 +20,10 @@ mod raw;
 
 use clock::processor_seconds;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
-use pcadlang::geom::{Affine, Mesh, Solid};
-use pcadlang::render::{Camera, Channels, Contours, Frame, Projection, View};
-use pcadlang::vision::ContourMap;
-use pcadlang::vision::chamfer::{Chamfer, ChamferOptions, Scratch};
+use pcadlang_scene::geom::{Affine, Mesh, Solid};
+use pcadlang_scene::render::{Camera, Channels, Contours, Frame, Projection, View};
+use pcadlang_scene::vision::ContourMap;
+use pcadlang_scene::vision::chamfer::{Chamfer, ChamferOptions, Scratch};
 use plain::Plain;
 use raw::{Pose, Raw, load, words};
 use std::error::Error;

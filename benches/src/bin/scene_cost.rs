@@ -16,15 +16,15 @@
 mod clock;
 
 use clock::processor_seconds;
-use pcadlang::infer::{Drift, Kernel, Pick, SiteSelection, StepContext};
-use pcadlang::lang::value::Value;
-use pcadlang::render::Camera;
-use pcadlang::report::pictures::shaded;
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::scene::{DepthValue, ImageValue, MaskValue, ViewValue};
-use pcadlang::trace::{Draws, Selector, Trace};
-use pcadlang::vision::{ContourMap, DepthMap, Mask, Photo};
 use pcadlang::{Model, Program};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Draws, Selector, Trace};
+use pcadlang_inference::{Drift, Kernel, Pick, SiteSelection, StepContext};
+use pcadlang_library::scene::{DepthValue, ImageValue, MaskValue, ViewValue};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
+use pcadlang_report::pictures::shaded;
+use pcadlang_scene::render::Camera;
+use pcadlang_scene::vision::{ContourMap, DepthMap, Mask, Photo};
 use std::error::Error;
 use std::fmt::Write;
 

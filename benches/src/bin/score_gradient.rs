@@ -9,13 +9,13 @@
 //! Each coordinate is scaled so that it moves its part of the surface by half a pixel in
 //! the picture.
 
-use pcadlang::lang::value::Value;
-use pcadlang::render::Camera;
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::scene::{ImageValue, ViewValue};
-use pcadlang::trace::{Change, Draws, Selector, Target, Trace};
-use pcadlang::vision::ContourMap;
 use pcadlang::{Model, Program};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Change, Draws, Selector, Target, Trace};
+use pcadlang_library::scene::{ImageValue, ViewValue};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
+use pcadlang_scene::render::Camera;
+use pcadlang_scene::vision::ContourMap;
 use std::time::Instant;
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;

@@ -11,10 +11,10 @@
 mod clock;
 
 use clock::processor_seconds;
-use pcadlang::infer::{Gibbs, Kernel, Pick, SiteSelection, StepContext};
-use pcadlang::lang::value::Value;
-use pcadlang::trace::{Selector, Trace};
 use pcadlang::{Model, Program};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Selector, Trace};
+use pcadlang_inference::{Gibbs, Kernel, Pick, SiteSelection, StepContext};
 use std::error::Error;
 
 /// The number of transitions before timing starts.

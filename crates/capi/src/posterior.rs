@@ -2,7 +2,7 @@
 
 use crate::failure::{attempt, free, handle, text};
 use pcadlang::Posterior;
-use pcadlang::report::Quantity;
+use pcadlang_report::Quantity;
 use serde_json::{Map, Value, json};
 use std::ffi::{CString, c_char};
 

@@ -2,9 +2,9 @@
 
 use crate::failure::{code, free, handle, owned, text};
 use crate::posterior::PcadPosterior;
-use pcadlang::scene::ImageValue;
-use pcadlang::vision::Photo;
 use pcadlang::{Model, Program, RunOptions, Value};
+use pcadlang_library::scene::ImageValue;
+use pcadlang_scene::vision::Photo;
 use std::ffi::c_char;
 use std::time::Duration;
 

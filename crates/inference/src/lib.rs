@@ -39,40 +39,29 @@ pub use callback::{Callback, Callbacks};
 pub use calls::explained::{Selecting, selecting};
 pub use calls::host_kernel::KernelCall;
 pub(crate) use calls::host_kernel::KernelMaker;
-#[doc(hidden)]
 pub use calls::selection::{not_a_selection, selected};
-#[doc(hidden)]
 pub use chains::run_chains;
-#[doc(hidden)]
 pub use default_plan::default_plan;
 pub use force::put as force;
 pub use gather::best::{BestSoFar, BestState};
-#[doc(hidden)]
 pub use gather::evidence::{Evidence, Weighed};
-#[doc(hidden)]
 pub use gather::kept::{KeptTrace, KeptTraces};
-#[doc(hidden)]
 pub use gather::trajectory::{Trajectory, TrajectoryState};
 pub use init::attempts;
-#[doc(hidden)]
 pub use init::{Start, StartError, starts};
 pub use kernel::accepts;
 pub use kernel::{Kernel, Outcome, Pick, SiteSelection, StepContext, decide, recoverable};
-#[doc(hidden)]
 pub use kernels::{
     Abc, AbcSmc, Delayed, Hamiltonian, Hmc, Independent, Knn, Nuts, Optimize, Smc, Temper,
 };
 pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh, Slice};
-#[doc(hidden)]
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
 pub use pause::Pause;
 use pcadlang_numerics::platform::threads as parallel;
 pub use pcadlang_numerics::platform::threads::in_parallel;
 pub use plan::checkpoint::Checkpoint;
-#[doc(hidden)]
 pub use plan::run_from;
 pub use run::{ChainError, ChainResult, Progress, RunOptions};
 pub use state::StateError;
 pub use state::{pack, unpack};
-#[doc(hidden)]
 pub use structure::stuck_structure;

@@ -19,7 +19,6 @@ pub mod evaluation;
 pub mod film;
 mod hash;
 pub mod html;
-#[doc(hidden)]
 pub mod inference;
 mod modes;
 mod moments;
@@ -28,33 +27,22 @@ pub mod pictures;
 mod reread;
 mod rundir;
 mod sinks;
-#[doc(hidden)]
 pub mod svg;
 pub mod table;
 mod warnings;
 pub mod zarr;
 
-#[doc(hidden)]
 pub use aligned::align;
-#[doc(hidden)]
 pub use atomic_write::write_file;
-#[doc(hidden)]
 pub use chain_file::{ChainFile, ChainFiles};
-#[doc(hidden)]
 pub use draws::widen;
 pub use draws::{ChainDraws, Quantity, quantities};
-#[doc(hidden)]
 pub use hash::{bytes_hash, text_hash};
-#[doc(hidden)]
 pub use modes::{DISAGREE, Mode, modes, modes_table};
-#[doc(hidden)]
 pub use moments::{Moments, Point};
-#[doc(hidden)]
 pub use number::{number, r_hat_text, seconds};
 pub use pcadlang_inference::diagnostics::Summary;
-#[doc(hidden)]
 pub use reread::{rename, reread};
 pub use rundir::{RunDir, RunDirError};
 pub use sinks::{Memory, Tee};
-#[doc(hidden)]
 pub use warnings::warnings;

@@ -31,7 +31,6 @@ pub enum SyntaxErrorKind {
     /// A character that begins no token.
     UnknownCharacter(char),
     /// A spelling from another language.
-    #[doc(hidden)]
     Foreign(Foreign, String),
     /// A string without its closing quote on the same line.
     UnterminatedString,
@@ -78,7 +77,6 @@ pub enum SyntaxErrorKind {
         /// The tokens that were expected, in words.
         expected: String,
         /// Advice on what was probably meant.
-        #[doc(hidden)]
         advice: Option<Advice>,
     },
     /// An `if` without `else` whose branch has a value.

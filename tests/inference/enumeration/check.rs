@@ -6,10 +6,12 @@ use super::plans::Plan;
 use super::posterior::Posterior;
 use super::verdict::{Counts, Pooled};
 use pcadlang::Program;
-use pcadlang::infer::draws::Discard;
-use pcadlang::infer::{Callback, ChainError, Latent, Neighbours, Progress, RunOptions, run_from};
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace::{Draws, Limits, Trace};
+use pcadlang_engine::trace::{Draws, Limits, Trace};
+use pcadlang_inference::draws::Discard;
+use pcadlang_inference::{
+    Callback, ChainError, Latent, Neighbours, Progress, RunOptions, run_from,
+};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
 use std::sync::{Arc, Mutex};
 
 /// The number of intervals in which positions of continuous choices are counted.

@@ -4,7 +4,7 @@
 
 use super::execute::Integration;
 use super::program::{Body, Def, Dist, Effect, Expr, Function, Id, Item, Program, Right};
-use pcadlang::rng::{Purpose, Stream, StreamKey};
+use pcadlang_numerics::rng::{Purpose, Stream, StreamKey};
 
 /// The expressions in scope: discrete names with their greatest value, and numbers that
 /// may be affine in Gaussian choices.

@@ -23,10 +23,10 @@ mod verdict;
 
 use check::{Said, check};
 use pcadlang::Model;
-use pcadlang::infer::calibration::{PlanSampler, Settings, geweke};
-use pcadlang::infer::{Progress, RunOptions};
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace::{Change, Draws, Limits, Trace};
+use pcadlang_engine::trace::{Change, Draws, Limits, Trace};
+use pcadlang_inference::calibration::{PlanSampler, Settings, geweke};
+use pcadlang_inference::{Progress, RunOptions};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
 use plans::Plan;
 use posterior::Posterior;
 use std::collections::BTreeMap;

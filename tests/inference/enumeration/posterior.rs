@@ -4,9 +4,9 @@ use super::execute::{CELLS, Execution, Integration, POINT, REACH, WIDTH, executi
 use super::gaussian::Gaussian;
 use super::program::Program;
 use pcadlang::Value;
-use pcadlang::dist::Datum;
-use pcadlang::rng::Stream;
-use pcadlang::trace::{Address, Constraint, Trace};
+use pcadlang_engine::trace::{Address, Constraint, Trace};
+use pcadlang_numerics::dist::Datum;
+use pcadlang_numerics::rng::Stream;
 use std::collections::BTreeMap;
 
 /// The values of the existing discrete choices, by address.

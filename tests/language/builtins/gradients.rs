@@ -4,11 +4,11 @@
 
 use super::*;
 use glam::DVec3;
-use pcadlang::geom::Affine;
-use pcadlang::lang::adjoint::Adjoint;
-use pcadlang::lang::builtins::Derivative;
-use pcadlang::lang::value::Value;
-use pcadlang::scene::{AffineValue, ArmatureValue, SolidValue};
+use pcadlang_engine::lang::adjoint::Adjoint;
+use pcadlang_engine::lang::builtins::Derivative;
+use pcadlang_engine::lang::value::Value;
+use pcadlang_library::scene::{AffineValue, ArmatureValue, SolidValue};
+use pcadlang_scene::geom::Affine;
 use std::collections::HashSet;
 
 /// Functions without a derivative, and the reason.
@@ -233,7 +233,7 @@ fn body() -> Value {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/programs/std/human/");
     let read = |name: &str| std::fs::read(format!("{folder}{name}")).map_err(|e| e.to_string());
     let name = "human.lod2.rig.json";
-    pcadlang::standard::table()
+    pcadlang_library::standard::table()
         .load("armature", name, &read(name).unwrap(), &Default::default(), &read)
         .unwrap()
 }

@@ -8,11 +8,11 @@ mod search;
 mod table;
 
 use pcadlang::Value;
-use pcadlang::lang::builtins::{Args, Builtin, Kind, Table};
-use pcadlang::lang::error::Fault;
+use pcadlang_engine::lang::builtins::{Args, Builtin, Kind, Table};
+use pcadlang_engine::lang::error::Fault;
 use std::sync::{Arc, LazyLock};
 
-static TABLE: LazyLock<Arc<Table>> = LazyLock::new(pcadlang::standard::table);
+static TABLE: LazyLock<Arc<Table>> = LazyLock::new(pcadlang_library::standard::table);
 
 /// A built-in by `module.name` or `name`.
 fn find(name: &str) -> &'static Builtin {

@@ -1,7 +1,7 @@
 //! Searches of the built-ins by words.
 
-use pcadlang::lang::builtins::search::search;
-use pcadlang::standard::table;
+use pcadlang_engine::lang::builtins::search::search;
+use pcadlang_library::standard::table;
 
 fn names(words: &str) -> Vec<String> {
     search(&table(), words).entries.iter().map(|b| b.full_name()).collect()

@@ -1,8 +1,8 @@
 //! The table: look-up, matching of arguments, and invariants of every entry.
 
 use super::*;
-use pcadlang::dist::{Dist, Numbers};
-use pcadlang::lang::builtins::Scalar;
+use pcadlang_engine::lang::builtins::Scalar;
+use pcadlang_numerics::dist::{Dist, Numbers};
 use std::collections::HashSet;
 use std::sync::Arc;
 

@@ -3,7 +3,7 @@
 use super::generator::Generator;
 use super::{bare, program, shown};
 use crate::common::snapshots;
-use pcadlang::syntax::{SyntaxErrorKind, WIDTH, format, parse, print, span::FileId};
+use pcadlang_syntax::{SyntaxErrorKind, WIDTH, format, parse, print, span::FileId};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! Random text: no text makes the parser panic, and all of its errors can be displayed.
 
 use super::{bare, shown};
-use pcadlang::syntax::{MAX_ERRORS, parse, parse_expr, print, span::FileId};
+use pcadlang_syntax::{MAX_ERRORS, parse, parse_expr, print, span::FileId};
 use proptest::prelude::*;
 
 /// Checks the properties that hold for every text.

@@ -4,8 +4,8 @@
 //! When the bytes run out, every choice is the simplest one, so trees are finite, and
 //! shrinking the bytes shrinks the program.
 
-use pcadlang::syntax::ast::*;
-use pcadlang::syntax::span::{Span, Spanned};
+use pcadlang_syntax::ast::*;
+use pcadlang_syntax::span::{Span, Spanned};
 use std::sync::Arc;
 
 const NAMES: [&str; 10] =

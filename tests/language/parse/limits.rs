@@ -1,7 +1,7 @@
 //! Texts designed to exhaust the stack, memory or time of a parser.
 
-use pcadlang::diag::MAX_SOURCE_BYTES;
-use pcadlang::syntax::{
+use pcadlang_syntax::diag::MAX_SOURCE_BYTES;
+use pcadlang_syntax::{
     MAX_DEPTH, MAX_NESTING, MAX_TOKENS, SyntaxErrorKind, parse, parse_expr, print, span::FileId,
 };
 

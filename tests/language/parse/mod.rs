@@ -13,10 +13,10 @@ mod samples;
 mod spans;
 mod texts;
 
-use pcadlang::diag::{IntoDiagnostic, SourceMap, render};
-use pcadlang::syntax::ast::{Expr, Program};
-use pcadlang::syntax::span::FileId;
-use pcadlang::syntax::{SyntaxError, parse, parse_expr};
+use pcadlang_syntax::ast::{Expr, Program};
+use pcadlang_syntax::diag::{IntoDiagnostic, SourceMap, render};
+use pcadlang_syntax::span::FileId;
+use pcadlang_syntax::{SyntaxError, parse, parse_expr};
 use std::fmt::Debug;
 
 /// Parses a program that must be valid.

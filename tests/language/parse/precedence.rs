@@ -1,8 +1,8 @@
 //! Precedence and associativity of operators.
 
 use super::{bare, expr, program};
-use pcadlang::syntax::ast::{BinaryOp, ExprKind, ItemKind, StmtKind, UnaryOp};
-use pcadlang::syntax::{parse_expr, print, print_expr, span::FileId};
+use pcadlang_syntax::ast::{BinaryOp, ExprKind, ItemKind, StmtKind, UnaryOp};
+use pcadlang_syntax::{parse_expr, print, print_expr, span::FileId};
 
 /// Asserts that both texts have the same meaning.
 fn same(text: &str, with_parentheses: &str) {

@@ -1,8 +1,8 @@
 //! Each mistake gives one error, and the surrounding statements are kept.
 
 use super::shown;
-use pcadlang::syntax::ast::{Expr, ExprKind, Item, ItemKind, Program, Stmt, StmtKind};
-use pcadlang::syntax::{MAX_ERRORS, SyntaxErrorKind, parse, print, span::FileId};
+use pcadlang_syntax::ast::{Expr, ExprKind, Item, ItemKind, Program, Stmt, StmtKind};
+use pcadlang_syntax::{MAX_ERRORS, SyntaxErrorKind, parse, print, span::FileId};
 
 /// Returns the program in canonical form, with invalid statements as `<error>`, and the
 /// number of errors.

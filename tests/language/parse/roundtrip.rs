@@ -3,7 +3,7 @@
 
 use super::generator::Generator;
 use super::{bare, shown};
-use pcadlang::syntax::{SyntaxErrorKind, parse, parse_expr, print, print_expr, span::FileId};
+use pcadlang_syntax::{SyntaxErrorKind, parse, parse_expr, print, print_expr, span::FileId};
 use proptest::prelude::*;
 
 /// A configuration without a file of past failures, since each failure should become a

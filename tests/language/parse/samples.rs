@@ -2,7 +2,7 @@
 
 use super::{bare, program};
 use crate::common::snapshots;
-use pcadlang::syntax::print;
+use pcadlang_syntax::print;
 
 #[test]
 fn samples_parse_as_printed() {

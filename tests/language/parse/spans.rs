@@ -1,10 +1,10 @@
 //! The positions of nodes and errors.
 
 use super::program;
-use pcadlang::diag::SourceMap;
-use pcadlang::syntax::ast::{ExprKind, ItemKind, Key, StmtKind};
-use pcadlang::syntax::span::{FileId, Span};
-use pcadlang::syntax::{SyntaxErrorKind, parse, parse_expr};
+use pcadlang_syntax::ast::{ExprKind, ItemKind, Key, StmtKind};
+use pcadlang_syntax::diag::SourceMap;
+use pcadlang_syntax::span::{FileId, Span};
+use pcadlang_syntax::{SyntaxErrorKind, parse, parse_expr};
 
 fn at(text: &str, span: Span) -> &str {
     &text[span.start as usize..span.end as usize]

@@ -1,8 +1,8 @@
 //! Lexemes: numbers, strings, comments, names, addresses, tags.
 
 use super::{bare, expr, program};
-use pcadlang::syntax::ast::{ExprKind, Key, SegmentName};
-use pcadlang::syntax::{SyntaxErrorKind, parse, parse_expr, print_expr, span::FileId};
+use pcadlang_syntax::ast::{ExprKind, Key, SegmentName};
+use pcadlang_syntax::{SyntaxErrorKind, parse, parse_expr, print_expr, span::FileId};
 
 fn errors(text: &str) -> Vec<SyntaxErrorKind> {
     parse(text, FileId(0)).1.into_iter().map(|e| e.kind).collect()

@@ -3,8 +3,8 @@
 use super::{line, refuses, says, session, state};
 use crate::common::folder::Folder;
 use pcadlang::Program;
-use pcadlang::session::Session;
-use pcadlang::trace::Stop;
+use pcadlang_engine::trace::Stop;
+use pcadlang_workbench::session::Session;
 
 #[test]
 fn help_knows_statements_kernels_and_subjects() {
@@ -29,7 +29,7 @@ fn help_knows_statements_kernels_and_subjects() {
 
 #[test]
 fn a_front_end_is_asked_for_what_a_session_cannot_do() {
-    use pcadlang::session::Request;
+    use pcadlang_workbench::session::Request;
     let folder = Folder::new("session_asks");
     std::fs::create_dir_all(folder.path().join("run")).unwrap();
     let at = |name: &str| folder.path().join(name).display().to_string();

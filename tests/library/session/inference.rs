@@ -2,8 +2,8 @@
 
 use super::{LINE, line, refuses, says, state};
 use pcadlang::Program;
-use pcadlang::session::{Session, Trouble};
-use pcadlang::trace::Stop;
+use pcadlang_engine::trace::Stop;
+use pcadlang_workbench::session::{Session, Trouble};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;

@@ -5,8 +5,8 @@ mod front_end;
 mod inference;
 
 use pcadlang::Program;
-use pcadlang::session::{Reply, Session};
-use pcadlang::trace::Stop;
+use pcadlang_engine::trace::Stop;
+use pcadlang_workbench::session::{Reply, Session};
 
 const LINE: &str = "let x = [0, 1, 2, 3];
 assume slope ~ normal(0, 5) #line;
@@ -230,7 +230,7 @@ fn flips_say_what_they_do() {
         let [old, new] = [0, 1].map(|k| {
             change["log joint ".len()..].split([' ', '(']).filter(|w| *w != "->").nth(k).unwrap()
         });
-        let shown = pcadlang::report::number;
+        let shown = pcadlang_report::number;
         assert_eq!(old, shown(f64::from_bits(before.2)), "{said}");
         let ratio: f64 =
             last.split("log ratio ").nth(1).unwrap().split(')').next().unwrap().parse().unwrap();

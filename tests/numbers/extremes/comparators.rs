@@ -3,10 +3,10 @@
 
 use super::points::Points;
 use super::table::agree;
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::vision::chamfer::Mode;
-use pcadlang::vision::keypoints::{Detection, RelativeDepthLikelihood};
-use pcadlang::vision::{
+use pcadlang_numerics::rng::{Purpose, StreamKey};
+use pcadlang_scene::vision::chamfer::Mode;
+use pcadlang_scene::vision::keypoints::{Detection, RelativeDepthLikelihood};
+use pcadlang_scene::vision::{
     Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, ContourSlice,
     DepthLikelihood, DepthMap, GradientDetector, KeypointLikelihood, KeypointOptions, Mask,
     MaskLikelihood, Photo, Region, RegionOptions, distance_transform,

@@ -4,8 +4,8 @@
 use super::points::Points;
 use super::table::{agree, rows};
 use nalgebra::DMatrix;
-use pcadlang::dist::Distribution as _;
-use pcadlang::dist::{Covariance, Datum, Gp, MvNormal};
+use pcadlang_numerics::dist::Distribution as _;
+use pcadlang_numerics::dist::{Covariance, Datum, Gp, MvNormal};
 
 fn function(name: &str, p: &[f64]) -> Covariance {
     match (name, p) {

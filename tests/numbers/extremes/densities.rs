@@ -4,7 +4,7 @@
 use super::points::Points;
 use super::table::{agree, rows};
 use crate::common::families::{datum, made};
-use pcadlang::dist::{Categorical, Datum, Dist, Flat, Flip, Iid, Ordered};
+use pcadlang_numerics::dist::{Categorical, Datum, Dist, Flat, Flip, Iid, Ordered};
 
 #[test]
 fn log_densities_agree_with_the_table() {

@@ -3,11 +3,11 @@
 
 use super::points::Points;
 use super::table::agree;
-use pcadlang::infer::diagnostics::{
+use pcadlang_inference::diagnostics::{
     Summary, ess_bulk, ess_mean, ess_quantile, ess_tail, mcse_mean, mcse_sd, modes, quantile,
     r_hat, summary,
 };
-use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
 
 /// Returns autocorrelated chains of approximately standard normal draws.
 fn chains() -> Vec<Vec<f64>> {

@@ -5,9 +5,9 @@
 use super::points::Points;
 use crate::common::{assert_mean, integrate, normal_pdf, run};
 use pcadlang::Model;
-use pcadlang::infer::draws::Discard;
-use pcadlang::infer::{Callback, ChainResult, Progress, RunOptions};
-use pcadlang::trace::{Draws, Trace};
+use pcadlang_engine::trace::{Draws, Trace};
+use pcadlang_inference::draws::Discard;
+use pcadlang_inference::{Callback, ChainResult, Progress, RunOptions};
 use std::sync::{Arc, Mutex};
 
 const SCALES: [&str; 5] = ["1e-150", "1e-8", "1", "1e8", "1e150"];

@@ -3,9 +3,9 @@
 
 use super::points::Points;
 use glam::{DVec3, Vec3};
-use pcadlang::geom::{Affine, Mesh, Solid, Topology, cuboid, sphere};
-use pcadlang::render::{Camera, Channels, Contours, Frame, Projection};
-use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
+use pcadlang_scene::geom::{Affine, Mesh, Solid, Topology, cuboid, sphere};
+use pcadlang_scene::render::{Camera, Channels, Contours, Frame, Projection};
 use std::sync::Arc;
 
 /// The largest relative error of a depth, for a surface whose normal is within 60 degrees
@@ -174,7 +174,7 @@ fn single_precision_is_near_double_precision() {
 
 /// Returns the same solid without the flag that its faces enclose a body.
 fn open(solid: &Solid) -> Solid {
-    let instance = |i: &pcadlang::geom::Instance| {
+    let instance = |i: &pcadlang_scene::geom::Instance| {
         let topology = Topology { encloses: false, ..(*i.mesh.topology).clone() };
         Solid::new(Arc::new(Mesh { topology: Arc::new(topology), ..(*i.mesh).clone() }))
             .placed(i.affine)

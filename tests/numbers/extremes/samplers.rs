@@ -4,7 +4,7 @@
 use super::points::Points;
 use super::table::{Row, rows};
 use crate::common::families::made;
-use pcadlang::rng::{Purpose, StreamKey};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
 
 const DRAWS: usize = 20_000;
 

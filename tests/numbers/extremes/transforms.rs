@@ -3,7 +3,7 @@
 
 use super::points::Points;
 use super::table::{Row, agree, rows};
-use pcadlang::dist::{Datum, Support};
+use pcadlang_numerics::dist::{Datum, Support};
 
 fn support(r: &Row) -> Support {
     match (r.name, &r.parameters[..]) {

@@ -8,9 +8,9 @@ mod scores;
 mod shapes;
 
 use crate::subjects::shipped;
-use pcadlang::geom::Mesh;
-use pcadlang::geom::Solid;
-use pcadlang::render::{Camera, Contours, Frame, View};
+use pcadlang_scene::geom::Mesh;
+use pcadlang_scene::geom::Solid;
+use pcadlang_scene::render::{Camera, Contours, Frame, View};
 use std::sync::Arc;
 
 /// Runs a function on a new thread, whose caches are empty.

@@ -1,11 +1,11 @@
 //! Scores: comparators, their prepared data, and what they remember of the last contours.
 
 use super::afresh;
-use pcadlang::lang::value::Value;
-use pcadlang::scene::{DepthValue, ImageValue, MaskValue};
-use pcadlang::trace::Draws;
-use pcadlang::vision::{DepthMap, Mask, Photo};
 use pcadlang::{Model, Program};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::Draws;
+use pcadlang_library::scene::{DepthValue, ImageValue, MaskValue};
+use pcadlang_scene::vision::{DepthMap, Mask, Photo};
 
 fn inside(i: u32, width: u32) -> bool {
     let (x, y) = (f64::from(i % width) - 50.0, f64::from(i / width) - 30.0);
@@ -117,7 +117,7 @@ fn program(scene: &str, kind: &str, compared: &str) -> (Model, usize) {
     (model.unwrap_or_else(|e| panic!("{e}\n{text}")), count)
 }
 
-fn put(t: &mut pcadlang::trace::Trace, address: &str, v: Value) {
+fn put(t: &mut pcadlang_engine::trace::Trace, address: &str, v: Value) {
     t.set(address, v, Draws::default()).unwrap_or_else(|e| panic!("{address}: {e}"));
 }
 

@@ -2,8 +2,8 @@
 
 use super::{mesh_bits, shipped};
 use glam::DVec3;
-use pcadlang::geom::armature::{Armature, JointPose, Rules, Turn};
-use pcadlang::geom::{Caps, Profile, Solid, lathe, sphere};
+use pcadlang_scene::geom::armature::{Armature, JointPose, Rules, Turn};
+use pcadlang_scene::geom::{Caps, Profile, Solid, lathe, sphere};
 use std::sync::Arc;
 
 /// Topologies shared by surfaces of revolution.

@@ -6,8 +6,8 @@ mod scenes;
 
 use crate::common::tape;
 use pcadlang::Program;
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::trace::{Change, Draws, Selector, Target, Trace};
+use pcadlang_engine::trace::{Change, Draws, Selector, Target, Trace};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
 
 fn draws() -> Draws {
     Draws { key: StreamKey::new(9, 0, Purpose::VALUES), step: 0, substream: 0 }

@@ -3,12 +3,12 @@
 use super::{compare, draws};
 use crate::common::folder::Folder;
 use pcadlang::Program;
-use pcadlang::dist::Datum;
-use pcadlang::lang::value::Value;
-use pcadlang::render::Camera;
-use pcadlang::scene::{DepthValue, ImageValue, MaskValue, ViewValue};
-use pcadlang::trace::{Change, Target, Trace};
-use pcadlang::vision::{ContourMap, DepthMap, Mask, Photo};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Change, Target, Trace};
+use pcadlang_library::scene::{DepthValue, ImageValue, MaskValue, ViewValue};
+use pcadlang_numerics::dist::Datum;
+use pcadlang_scene::render::Camera;
+use pcadlang_scene::vision::{ContourMap, DepthMap, Mask, Photo};
 
 #[test]
 fn bodies_with_detected_joints() {

@@ -1,7 +1,7 @@
 //! A simple edge detector, so that the comparison does not depend on the library's own:
 //! smoothed colour gradients, ridges with sub-pixel offsets, hysteresis.
 
-use pcadlang::vision::ContourMap;
+use pcadlang_scene::vision::ContourMap;
 
 /// Detects the edges of a picture.
 pub fn detect(img: &image::RgbImage) -> ContourMap {

@@ -10,9 +10,9 @@ mod outline;
 
 use lathe::{Lathe, Numbers};
 use outline::{Outline, overlap};
-use pcadlang::vision::ContourSlice;
-use pcadlang::vision::chamfer::{Chamfer, ChamferOptions, Scratch};
-use pcadlang::vision::contour_ratio::{self, ContourRatio, ContourRatioOptions};
+use pcadlang_scene::vision::ContourSlice;
+use pcadlang_scene::vision::chamfer::{Chamfer, ChamferOptions, Scratch};
+use pcadlang_scene::vision::contour_ratio::{self, ContourRatio, ContourRatioOptions};
 use std::time::Instant;
 
 type Score = Box<dyn FnMut(&ContourSlice<'_>) -> f64>;
@@ -91,7 +91,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 fn comparators(
-    map: &pcadlang::vision::ContourMap,
+    map: &pcadlang_scene::vision::ContourMap,
     size: u32,
     full: bool,
 ) -> Result<Vec<(String, Score)>, Box<dyn std::error::Error>> {

@@ -1,7 +1,7 @@
 //! Silhouettes as sub-pixel outlines: the level 0.5 of a blurred mask, by marching
 //! squares.
 
-use pcadlang::vision::ContourSlice;
+use pcadlang_scene::vision::ContourSlice;
 
 /// The elements of an outline.
 #[derive(Default)]

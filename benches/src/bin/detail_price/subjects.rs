@@ -4,8 +4,8 @@
 pub mod shipped;
 
 use glam::{DVec3, Vec3};
-use pcadlang::geom::armature::{Armature, JointPose, Rules};
-use pcadlang::geom::{Affine, Caps, GeomError, Mesh, Profile, Solid};
+use pcadlang_scene::geom::armature::{Armature, JointPose, Rules};
+use pcadlang_scene::geom::{Affine, Caps, GeomError, Mesh, Profile, Solid};
 use shipped::human;
 use std::sync::Arc;
 

@@ -1,14 +1,14 @@
 //! Code shared by the recovery examples: a shipped program observes the clean contours of
 //! one of its own draws.
 
-use pcadlang::lang::value::Value;
-use pcadlang::render::Camera;
-use pcadlang::rng::{Purpose, StreamKey};
-use pcadlang::scene::{ImageValue, ViewValue};
-use pcadlang::shipped;
-use pcadlang::trace::{Draws, Trace};
-use pcadlang::vision::ContourMap;
 use pcadlang::{Model, Program};
+use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::{Draws, Trace};
+use pcadlang_library::scene::{ImageValue, ViewValue};
+use pcadlang_library::shipped;
+use pcadlang_numerics::rng::{Purpose, StreamKey};
+use pcadlang_scene::render::Camera;
+use pcadlang_scene::vision::ContourMap;
 use std::sync::Arc;
 
 /// The longer side of the pictures, in pixels.

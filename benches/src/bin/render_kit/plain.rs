@@ -2,7 +2,7 @@
 //! where depth jumps or bends, and the mean of the distance transform at contour pixels.
 
 use super::raw::{Pose, Raw};
-use pcadlang::vision::distance_transform::distance_transform;
+use pcadlang_scene::vision::distance_transform::distance_transform;
 
 /// A neighbour that is farther by more than this fraction is behind.
 const JUMP: f32 = 0.03;

@@ -1,8 +1,8 @@
 //! Shipped human bodies, for examples, benchmarks and tests.
 
-use pcadlang::geom::armature::{Armature, morphs_from_json, rig_from_json};
-use pcadlang::geom::{GeomError, obj};
-use pcadlang::shipped;
+use pcadlang_library::shipped;
+use pcadlang_scene::geom::armature::{Armature, morphs_from_json, rig_from_json};
+use pcadlang_scene::geom::{GeomError, obj};
 use std::sync::Arc;
 
 /// Loads a human body: `human.lod2` (coarse), `human.lod1` or `human`.

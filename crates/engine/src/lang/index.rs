@@ -78,7 +78,6 @@ pub fn xyz(v: [f64; 3]) -> Value {
 impl Adjoint {
     /// Adds to the part that indexing a value with these keys selects, one key after the
     /// other.
-    #[doc(hidden)]
     pub fn add_at(&mut self, base: &Value, keys: &[Value], by: Adjoint) {
         let Some((key, rest)) = keys.split_first() else { return self.add(by) };
         if by.is_zero() {
@@ -109,7 +108,6 @@ impl Adjoint {
     }
 
     /// Adds to the adjoint of element `i` of an array, or of field `i` of a record.
-    #[doc(hidden)]
     pub fn add_position(&mut self, base: &Value, i: usize, by: Adjoint) {
         match base {
             Value::Record(r) => {

@@ -353,6 +353,7 @@ impl Value {
     /// Returns whether it is within the limits. The time is proportional to its elements,
     /// but does not depend on the numbers in arrays of numbers, and the search stops as
     /// soon as a limit is exceeded.
+    #[doc(hidden)]
     pub fn extent(&self) -> Extent {
         let mut left = MOST_ELEMENTS;
         extent(self, MOST_NESTED, &mut left)

@@ -22,12 +22,14 @@ impl Trace {
     }
 
     /// Returns the identity of the trace that selections belong to.
+    #[doc(hidden)]
     pub fn identity(&self) -> &Arc<()> {
         &self.identity
     }
 
     /// Returns the current members of a selection as a shared list, which is replaced
     /// when they change.
+    #[doc(hidden)]
     pub fn listed(&self, selection: Selection) -> &Arc<Vec<Target>> {
         self.graph.choices.selections[selection.0 as usize].listed()
     }
@@ -118,6 +120,7 @@ impl Trace {
     /// [`Trace::free`] for choices that moves in the unconstrained space can reach in all
     /// parts: `None` also for a partly discrete choice, which a [`Change::Free`] sets to
     /// its smallest value.
+    #[doc(hidden)]
     pub fn free_to_move(&self, t: Target) -> Option<(Vec<f64>, f64)> {
         self.free_unless(t, Support::has_discrete_part)
     }
@@ -173,6 +176,7 @@ impl Trace {
 
     /// Returns the observations whose values are outside the support of their
     /// distributions, by address, with the reason.
+    #[doc(hidden)]
     pub fn outside_support(&self) -> Vec<(Address, String)> {
         let zero = self.scored().into_iter().filter(|(_, s)| *s == f64::NEG_INFINITY);
         let why = |(n, _)| {

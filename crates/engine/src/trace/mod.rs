@@ -304,6 +304,7 @@ impl Trace {
     ///
     /// # Errors
     /// As [`Trace::gradient`].
+    #[doc(hidden)]
     pub fn weighted_gradient(
         &self,
         targets: &[Target],
@@ -321,6 +322,7 @@ impl Trace {
     }
 
     /// Whether nothing has been committed since the program was run.
+    #[doc(hidden)]
     pub fn is_new(&self) -> bool {
         self.graph.revision == 0
     }
@@ -344,6 +346,7 @@ impl Trace {
 
     /// Returns the condition that interrupts updates, and searches that consist of many
     /// updates.
+    #[doc(hidden)]
     pub fn stop(&self) -> &Stop {
         &self.graph.limits.stop
     }
@@ -382,6 +385,7 @@ impl Trace {
     ///
     /// # Errors
     /// If the program fails.
+    #[doc(hidden)]
     pub fn another(
         &self,
         constraints: impl IntoIterator<Item = (u64, Constraint)>,

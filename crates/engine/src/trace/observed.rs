@@ -186,6 +186,7 @@ impl Trace {
 
     /// Returns the values that replace the program's observed values. The allocation
     /// changes whenever they do, so that holders can detect a change by pointer.
+    #[doc(hidden)]
     pub fn replacements(&self) -> &Arc<Observed> {
         &self.graph.observed
     }
@@ -194,6 +195,7 @@ impl Trace {
     ///
     /// # Errors
     /// As [`Trace::set_observed`].
+    #[doc(hidden)]
     pub fn observe_as(&mut self, other: &Trace) -> TraceResult<()> {
         if Arc::ptr_eq(&self.graph.observed, &other.graph.observed) {
             return Ok(());

@@ -30,6 +30,7 @@ impl Trace {
     /// Evaluates a function of the program, which sees the present state, with these
     /// arguments. One that is missing is an error only if the function reads it. Choices
     /// that the state lacks are drawn as by [`Trace::query`].
+    #[doc(hidden)]
     pub fn call(
         &mut self,
         function: BlockId,

@@ -60,6 +60,7 @@ impl Host {
     }
 
     /// These built-ins and the host's, unchecked.
+    #[doc(hidden)]
     pub fn added_to(&self, own: &Table) -> Table {
         let mut table = own.clone().with(self.entries.iter().map(|e| Builtin::clone(&e.builtin)));
         table.hooks.extend(self.hooks.iter().cloned());
@@ -71,6 +72,7 @@ impl Host {
     /// # Errors
     /// A name that is none or taken, arguments that cannot be told apart, a gradient of
     /// what is no function: all of them.
+    #[doc(hidden)]
     pub fn table(&self, own: &Table) -> Result<Arc<Table>, Error> {
         let mut diagnostics = Vec::new();
         let mut wrong = |message: String, hint: &str| {

@@ -10,7 +10,6 @@ use pcadlang_syntax::span::FileId;
 use pcadlang_syntax::{SyntaxError, parse, parse_expr};
 use std::sync::Arc;
 
-#[doc(hidden)]
 impl Program {
     /// Returns the same program with another text. It keeps its parameters and data, and
     /// the data files that have been read.
@@ -106,7 +105,6 @@ impl Program {
     }
 }
 
-#[doc(hidden)]
 impl Model {
     /// Returns the names of the `infer` blocks that have one.
     pub fn plan_names(&self) -> impl Iterator<Item = &str> {

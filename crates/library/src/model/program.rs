@@ -123,6 +123,7 @@ impl Program {
     }
 
     /// Returns its syntax trees, and the texts that they are from.
+    #[doc(hidden)]
     pub fn loaded(&self) -> (&Loaded, &SourceMap) {
         (&self.loaded, &self.sources)
     }

@@ -41,7 +41,6 @@ impl Dist {
         stored_support() -> Support;
         mean() -> Option<f64>;
         sd() -> Option<f64>;
-        #[doc(hidden)]
         cdf_slopes(x: f64) -> Option<CdfSlopes>;
     }
 

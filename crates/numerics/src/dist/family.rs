@@ -90,7 +90,6 @@ pub trait Named {
     const NAME: &'static str;
 
     /// Returns the error that a parameter violates this rule.
-    #[doc(hidden)]
     fn bad(parameter: &'static str, value: impl ToString, rule: &'static str) -> ParamError {
         ParamError::new(Self::NAME, parameter, value, rule)
     }

@@ -335,7 +335,6 @@ fn put(value: &mut Value, xs: &[f64]) {
 impl Trace {
     /// Whether every node of a trace of the same history is the same to the last bit; else
     /// says how one differs.
-    #[doc(hidden)]
     pub fn same_nodes(&self, other: &Trace) -> Result<(), String> {
         let (mine, theirs) = (&self.graph, &other.graph);
         let all = |g: &Graph| (g.nodes.len(), g.prior.clone(), g.likelihood.clone());
