@@ -25,8 +25,8 @@ use std::time::{Duration, Instant};
 
 /// The mutated folders.
 const FOLDERS: [&str; 6] = [
-    "src/infer",
-    "src/trace",
+    "crates/inference/src",
+    "crates/engine/src/trace",
     "crates/numerics/src/dist",
     "crates/numerics/src/rng",
     "crates/scene/src/render",
@@ -34,7 +34,8 @@ const FOLDERS: [&str; 6] = [
 ];
 
 /// The sources of the crates that are mutated.
-const CRATES: [&str; 3] = ["src", "crates/numerics/src", "crates/scene/src"];
+const CRATES: [&str; 4] =
+    ["crates/engine/src", "crates/inference/src", "crates/numerics/src", "crates/scene/src"];
 
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 

@@ -198,6 +198,7 @@ fn branches_with_choices_of_their_own() {
 /// A hidden Markov model as a loop that reads its own container, compared with the
 /// forward-backward algorithm.
 #[test]
+#[ignore = "half a minute"]
 fn hidden_markov_model() {
     let obs = [0.2, 1.1, 2.3, 1.9, 0.4];
     let trans = [[0.8, 0.15, 0.05], [0.2, 0.6, 0.2], [0.1, 0.3, 0.6]];
@@ -246,6 +247,7 @@ fn hidden_markov_model() {
 /// Partitions of three points under a Dirichlet process (stick-breaking with `mem`),
 /// compared with the enumeration of all five partitions.
 #[test]
+#[ignore = "half a minute"]
 fn open_universe_with_mem() {
     let y = [-1.0, -0.5, 2.0];
     // The marginal density of a group of points with a centre ~ normal(0, 2) and noise 1.
@@ -445,6 +447,7 @@ fn optimize_finds_the_mode() {
 /// posterior invariant. So does a search by a surrogate that sees neither mode (it has to
 /// depend on the choice, since a choice that nothing depends on does not exist).
 #[test]
+#[ignore = "half a minute"]
 fn jumps_between_modes_keep_their_weights() {
     let density = |x: f64| normal_pdf(x, 0.5, 2.0) * normal_pdf(9.0, x * x, 1.0);
     let (all, right) = (integrate(density, -9.0, 9.0, 4000), integrate(density, 0.0, 9.0, 4000));

@@ -47,6 +47,7 @@ fn assert_spread(what: &str, draws: &Draws, y: &[f64]) {
 }
 
 #[test]
+#[ignore = "half a minute"]
 fn joint_conditions_in_every_grouping() {
     let y = [2.1, 1.8, 2.3, 0.2, -0.3, 2.0];
     let (mean, sd) = expected(&y);

@@ -110,6 +110,7 @@ fn shipped_two_people() {
 }
 
 #[test]
+#[ignore = "half a minute"]
 fn shipped_animal() {
     same_of_picture("autorig.pcad", Some(48), &[SKIER], 20, 20);
 }
