@@ -35,7 +35,6 @@ mod testing;
 pub use callback::{Callback, Callbacks};
 pub use calls::explained::{Selecting, selecting};
 pub use calls::host_kernel::KernelCall;
-pub(crate) use calls::host_kernel::KernelMaker;
 #[doc(hidden)]
 pub use calls::selection::{not_a_selection, selected};
 #[doc(hidden)]
@@ -55,6 +54,7 @@ pub use init::attempts;
 pub use init::{Start, StartError, starts};
 pub use kernel::accepts;
 pub use kernel::{Kernel, Outcome, Pick, SiteSelection, StepContext, decide, recoverable};
+pub use kernels::table;
 #[doc(hidden)]
 pub use kernels::{
     Abc, AbcSmc, Delayed, Hamiltonian, Hmc, Independent, Knn, Nuts, Optimize, Smc, Temper,

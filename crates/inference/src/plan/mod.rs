@@ -1,7 +1,7 @@
 //! Running a compiled inference block on a chain, step by step.
 
 mod apply;
-pub(super) mod banks;
+mod check;
 pub(super) mod checkpoint;
 mod place;
 mod resume;
@@ -41,13 +41,13 @@ pub(crate) fn run_chain(
     let started = Instant::now();
     let options = &stoppable(options, progress);
     if let Some(checkpoint) = sink.resume().map_err(ChainError::Sink)? {
-        banks::check(code, &plan.steps, options)?;
+        check::check(code, &plan.steps, options)?;
         return Runner::resume(code, plan, options, progress, sink, chain, checkpoint)?.run();
     }
     let (how, from) = shared.get(|| start_of(code, plan, options))?;
     // Under a time limit a quarter of it is for the start, as much as that leaves to warm-up.
     let how = Start { within: options.time.map(|t| t / 4), ..how };
-    banks::check(code, &plan.steps, options)?;
+    check::check(code, &plan.steps, options)?;
     let mut begun =
         starts_from(code, (options.seed, chain), how, from.as_ref(), options.limits.clone())
             .map_err(ChainError::Start)?;
@@ -74,7 +74,7 @@ pub fn run_from(
 ) -> Result<ChainResult, ChainError> {
     let started = Instant::now();
     let options = &stoppable(options, progress);
-    banks::check(code, &plan.steps, options)?;
+    check::check(code, &plan.steps, options)?;
     trace.rollback();
     trace.set_limits(options.limits.clone());
     run_among(code, plan, options, progress, sink, (chain, started), vec![trace])

@@ -2,12 +2,12 @@
 
 use super::linear::{definite, matrix};
 use super::{
-    Builtin, Row, Table, covariance, data, distributions, examples, forms, inference, interp, list,
-    log_density, math, operators, reduce,
+    Builtin, Row, Table, covariance, data, distributions, examples, forms, interp, list,
+    log_density, math, operators, plans, reduce,
 };
 
 /// The language's own built-ins, in the order of the reference.
-pub(super) fn all() -> impl Iterator<Item = Builtin> {
+fn all(kernels: impl IntoIterator<Item = Builtin>) -> impl Iterator<Item = Builtin> {
     let functions: [&[Row]; 7] = [
         operators::TABLE,
         math::TABLE,
@@ -17,16 +17,24 @@ pub(super) fn all() -> impl Iterator<Item = Builtin> {
         matrix::TABLE,
         definite::TABLE,
     ];
-    let rest: [&[Row]; 5] =
-        [log_density::TABLE, covariance::TABLE, forms::TABLE, data::TABLE, inference::TABLE];
+    let rest: [&[Row]; 4] = [log_density::TABLE, covariance::TABLE, forms::TABLE, data::TABLE];
     let rows = |tables: Vec<&'static [Row]>| tables.into_iter().flatten().map(Builtin::from);
-    let all = rows(functions.into()).chain(distributions::all()).chain(rows(rest.into()));
-    all.map(|builtin| Builtin { example: examples::of(&builtin.name), ..builtin })
+    let own = rows(functions.into()).chain(distributions::all()).chain(rows(rest.into()));
+    let shown = |builtin: Builtin| Builtin { example: examples::of(&builtin.name), ..builtin };
+    own.map(shown).chain(kernels).chain(plans::TABLE.iter().map(Builtin::from).map(shown))
+}
+
+impl Table {
+    /// The built-ins of the language with these kernels, which the reference lists before
+    /// the other names of plans.
+    pub fn with_kernels(kernels: impl IntoIterator<Item = Builtin>) -> Self {
+        Table::empty().with(all(kernels))
+    }
 }
 
 impl Default for Table {
-    /// The built-ins of the language alone.
+    /// The built-ins of the language without kernels.
     fn default() -> Self {
-        Table::empty().with(all())
+        Table::with_kernels([])
     }
 }
