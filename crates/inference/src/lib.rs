@@ -54,10 +54,9 @@ pub use init::attempts;
 pub use init::{Start, StartError, starts};
 pub use kernel::accepts;
 pub use kernel::{Kernel, Outcome, Pick, SiteSelection, StepContext, decide, recoverable};
-pub use kernels::table;
 #[doc(hidden)]
 pub use kernels::{
-    Abc, AbcSmc, Delayed, Hamiltonian, Hmc, Independent, Knn, Nuts, Optimize, Smc, Temper,
+    Abc, AbcSmc, Delayed, Hamiltonian, Hmc, Independent, Knn, Nuts, Optimize, Smc, Temper, table,
 };
 pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh, Slice};
 #[doc(hidden)]

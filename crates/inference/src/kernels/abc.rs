@@ -31,7 +31,7 @@ pub(crate) const ROW: KernelRow = KernelRow::applying(
             Type::Int,
             "none",
             "With this many particles, each step draws a complete state as `smc` does, with \
-                 tolerances decreasing to `eps` (Del Moral et al. 2012).",
+             tolerances decreasing to `eps` (Del Moral et al. 2012).",
         ),
         opt("moves", Type::Int, "1", "The number of moves of each particle at each tolerance."),
     ],

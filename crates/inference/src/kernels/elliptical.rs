@@ -17,7 +17,8 @@ use std::f64::consts::TAU;
 pub(crate) const ROW: KernelRow = KernelRow::moving(
     "elliptical",
     &[SEL],
-    "Elliptical slice sampling of choices with a Gaussian prior: normal, mv_normal, gp (Murray et al. 2010).",
+    "Elliptical slice sampling of choices with a Gaussian prior: normal, mv_normal, gp \
+     (Murray et al. 2010).",
     number!("infer { repeat 100 { elliptical(@x); collect x; } }"),
     |scope, _| Ok(Box::new(Elliptical::new(scope))),
 );

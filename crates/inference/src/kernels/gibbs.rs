@@ -18,8 +18,14 @@ use pcadlang_numerics::rng::Stream;
 pub(crate) const ROW: KernelRow = KernelRow::moving(
     "gibbs",
     &[SEL],
-    "Draws a selected finite discrete choice from its full conditional, by enumeration of its values.",
-    "for i in 0 .. 4 {\n  z[i] ~ flip(0.3);\n  observe normal(if z[i] { 1 } else { 0 }, 0.5) = 0.8 as y;\n}\ninfer { repeat 100 { gibbs(@z[0]); collect z[0]; } }",
+    "Draws a selected finite discrete choice from its full conditional, by enumeration of \
+     its values.",
+    "\
+for i in 0 .. 4 {
+  z[i] ~ flip(0.3);
+  observe normal(if z[i] { 1 } else { 0 }, 0.5) = 0.8 as y;
+}
+infer { repeat 100 { gibbs(@z[0]); collect z[0]; } }",
     |scope, _| Ok(Box::new(Gibbs::new(scope))),
 );
 

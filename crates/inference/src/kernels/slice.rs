@@ -22,13 +22,15 @@ pub(crate) const ROW: KernelRow = KernelRow::moving(
             "width",
             Type::Num,
             "learnt",
-            "The width of the initial interval, in the unconstrained space; by default 1, adapted in warm-up.",
+            "The width of the initial interval, in the unconstrained space; by default 1, \
+             adapted in warm-up.",
         ),
         opt(
             "doubling",
             Type::Bool,
             "false",
-            "Expands the interval by doubling instead of stepping out: for slices much wider than `width`.",
+            "Expands the interval by doubling instead of stepping out: for slices much wider \
+             than `width`.",
         ),
     ],
     "Slice sampling of one number at a time with stepping out or doubling (Neal 2003).",

@@ -17,20 +17,24 @@ use pcadlang_engine::trace::{Constraint, Trace, TraceResult};
 pub(crate) const ROW: KernelRow = KernelRow::applying(
     "temper",
     &[
-            INNER,
-            opt("levels", Type::Int, "6", "The number of temperatures."),
-            opt(
-                "hottest",
-                Type::Num,
-                "0.01",
-                "The lowest power of the likelihood; warm-up adapts the ladder of temperatures.",
-            ),
-        ],
+        INNER,
+        opt("levels", Type::Int, "6", "The number of temperatures."),
+        opt(
+            "hottest",
+            Type::Num,
+            "0.01",
+            "The lowest power of the likelihood; warm-up adapts the ladder of temperatures.",
+        ),
+    ],
     "Replica exchange (parallel tempering) over powers of the likelihood: each step updates \
      every replica, then proposes swaps of neighbours (Geyer 1991).",
     number!(
-            "infer {\n  warmup 200 { temper(drift(@x), levels = 3); }\n  repeat 100 { temper(drift(@x), levels = 3); collect x; }\n}"
-        ),
+        "\
+infer {
+  warmup 200 { temper(drift(@x), levels = 3); }
+  repeat 100 { temper(drift(@x), levels = 3); collect x; }
+}"
+    ),
     |call| {
         let levels = call.whole(1, 6, 2, 1000)?;
         let hottest = call.positive(2)?.unwrap_or(0.01);

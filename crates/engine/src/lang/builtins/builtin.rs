@@ -275,7 +275,7 @@ pub enum HostItem {
     Family(Arc<Make>),
     /// A family of likelihoods.
     Likelihood(Arc<Function>),
-    /// A maker of kernels; only `infer` knows its type.
+    /// A maker of kernels; only the crate of kernels knows its type.
     Kernel(State),
 }
 
@@ -304,7 +304,8 @@ pub struct Builtin {
     pub drawn: Drawn,
     /// Its derivative.
     pub derivative: Derivative,
-    /// The host's implementation; `None` for the language's own built-ins.
+    /// The closures behind it: of what a host brings, of a kernel, and of an incremental
+    /// function.
     pub host: Option<HostItem>,
     /// How files are read, for a kind of data.
     pub format: Option<Arc<dyn DataFormat>>,

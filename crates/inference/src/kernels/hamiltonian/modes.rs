@@ -43,13 +43,15 @@ pub(crate) const ROW: KernelRow = KernelRow::moving(
             "first",
             Type::Selection,
             "none",
-            "Choices that are optimised alone for some steps in each draw, before draws are compared.",
+            "Choices that are optimised alone for some steps in each draw, before draws are \
+             compared.",
         ),
         opt(
             "at",
             Type::Selection,
             "none",
-            "Observations that are replaced by their coarse surrogates during the search for modes.",
+            "Observations that are replaced by their coarse surrogates during the search for \
+             modes.",
         ),
     ],
     "Jumps between modes. The first step searches for them: the most probable draws of the \
