@@ -6,29 +6,24 @@ use super::{
     log_density, math, operators, plans, reduce,
 };
 
-/// The language's own built-ins, in the order of the reference.
-fn all(kernels: impl IntoIterator<Item = Builtin>) -> impl Iterator<Item = Builtin> {
-    let functions: [&[Row]; 7] = [
-        operators::TABLE,
-        math::TABLE,
-        reduce::TABLE,
-        list::TABLE,
-        interp::TABLE,
-        matrix::TABLE,
-        definite::TABLE,
-    ];
-    let rest: [&[Row]; 4] = [log_density::TABLE, covariance::TABLE, forms::TABLE, data::TABLE];
-    let rows = |tables: Vec<&'static [Row]>| tables.into_iter().flatten().map(Builtin::from);
-    let own = rows(functions.into()).chain(distributions::all()).chain(rows(rest.into()));
-    let shown = |builtin: Builtin| Builtin { example: examples::of(&builtin.name), ..builtin };
-    own.map(shown).chain(kernels).chain(plans::TABLE.iter().map(Builtin::from).map(shown))
-}
-
 impl Table {
-    /// The built-ins of the language with these kernels, which the reference lists before
-    /// the other names of plans.
+    /// The built-ins of the language with these kernels, in the order of the reference.
     pub fn with_kernels(kernels: impl IntoIterator<Item = Builtin>) -> Self {
-        Table::empty().with(all(kernels))
+        let functions: [&[Row]; 7] = [
+            operators::TABLE,
+            math::TABLE,
+            reduce::TABLE,
+            list::TABLE,
+            interp::TABLE,
+            matrix::TABLE,
+            definite::TABLE,
+        ];
+        let rest: [&[Row]; 4] = [log_density::TABLE, covariance::TABLE, forms::TABLE, data::TABLE];
+        let rows = |tables: Vec<&'static [Row]>| tables.into_iter().flatten().map(Builtin::from);
+        let shown = |builtin: Builtin| Builtin { example: examples::of(&builtin.name), ..builtin };
+        let own = rows(functions.into()).chain(distributions::all()).chain(rows(rest.into()));
+        let plans = rows(vec![plans::TABLE]);
+        Table::empty().with(own.map(shown).chain(kernels).chain(plans.map(shown)))
     }
 }
 
