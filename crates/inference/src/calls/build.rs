@@ -33,18 +33,11 @@ type Make = dyn Fn(&mut Call) -> Result<Built, Box<RunError>> + Send + Sync;
 
 /// Makes a kernel from its call; stored with its entry in the table of built-ins.
 pub(crate) struct KernelMaker {
-    make: Box<Make>,
+    pub make: Box<Make>,
     pub check: Option<Check>,
 }
 
 impl KernelMaker {
-    pub fn new(
-        make: impl Fn(&mut Call) -> Result<Built, Box<RunError>> + Send + Sync + 'static,
-        check: Option<Check>,
-    ) -> KernelMaker {
-        KernelMaker { make: Box::new(make), check }
-    }
-
     /// What makes this kernel; `None` of any other built-in.
     pub fn of(builtin: &Builtin) -> Option<&KernelMaker> {
         match &builtin.host {

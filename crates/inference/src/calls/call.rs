@@ -4,8 +4,7 @@ use crate::calls::build::{Built, Setting, build};
 use crate::calls::error::fail;
 use crate::calls::formula::{PlanEnv, evaluate};
 use crate::calls::selection::{scope, selector};
-use crate::kernel::SiteSelection;
-use crate::run::RunOptions;
+use crate::kernel::{Kernel, SiteSelection};
 use pcadlang_engine::lang::builtins::Builtin;
 use pcadlang_engine::lang::error::RunError;
 use pcadlang_engine::lang::plan::{Argument, KernelCall};
@@ -24,10 +23,6 @@ pub(crate) struct Call<'a, 'e> {
 impl<'a> Call<'a, '_> {
     pub fn span(&self) -> Span {
         self.call.span
-    }
-
-    pub fn options(&self) -> &'a RunOptions {
-        self.setting.options
     }
 
     /// The choices that the program froze.
@@ -52,9 +47,12 @@ impl<'a> Call<'a, '_> {
         }
     }
 
-    /// The choices that the first argument selects, and the signature of a kernel that
-    /// moves them.
-    pub fn moved(&mut self) -> Result<(SiteSelection, String), Box<RunError>> {
+    /// Makes a kernel that moves the choices of the first argument. Calls with the same
+    /// text, choices and values share one.
+    pub fn moving<K: Kernel + 'static>(
+        &mut self,
+        make: impl FnOnce(SiteSelection, &mut Self) -> Result<K, Box<RunError>>,
+    ) -> Result<Built, Box<RunError>> {
         let scope = self.scope(0)?.ok_or_else(|| self.not_a_kernel())?;
         let value = |arg: &Argument| match arg {
             Argument::Value(f) => evaluate(f, self.env).ok(),
@@ -62,7 +60,7 @@ impl<'a> Call<'a, '_> {
         };
         let given: Vec<Value> = self.call.args.iter().filter_map(value).collect();
         let signature = format!("{} {scope:?} {given:?}", self.call.text);
-        Ok((scope, signature))
+        Ok(Built::new(make(scope, self)?, signature))
     }
 
     /// The choices that an argument selects, without frozen ones.
@@ -87,11 +85,6 @@ impl<'a> Call<'a, '_> {
             Some(Argument::Choices(c)) => selector(&c.selection, self.env),
             _ => Ok(Selector::Nothing),
         }
-    }
-
-    /// Whether an argument is given as a value.
-    pub fn is_given(&self, place: usize) -> bool {
-        matches!(self.call.args.get(place), Some(Argument::Value(_)))
     }
 
     /// A value and where it is written, if it is given.

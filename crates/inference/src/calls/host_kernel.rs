@@ -51,9 +51,9 @@ impl KernelCall<'_> {
 ///
 /// # Errors
 /// What is wrong with the call, with its position.
-pub(crate) fn build_host_kernel(
+pub(crate) fn build_host_kernel<K: Kernel + 'static>(
     call: &mut Call,
-    make: impl Fn(&mut KernelCall) -> Result<Box<dyn Kernel>, Fault>,
+    make: impl Fn(&mut KernelCall) -> Result<K, Fault>,
 ) -> Result<Built, Box<RunError>> {
     let (mut values, mut scopes, mut kernels) = (Vec::new(), Vec::new(), Vec::new());
     let mut signature = call.call.text.to_string();
@@ -82,5 +82,5 @@ pub(crate) fn build_host_kernel(
     let values: Vec<&Value> = values.iter().collect();
     let args = Args { builtin: call.builtin, values: &values };
     let made = make(&mut KernelCall { args, scopes, kernels });
-    Ok(Built { kernel: made.map_err(|f| fault(call.span(), f))?, signature })
+    Ok(Built::new(made.map_err(|f| fault(call.span(), f))?, signature))
 }

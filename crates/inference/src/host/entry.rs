@@ -3,6 +3,7 @@
 use super::Previous;
 use super::checked::Checked;
 use crate::calls::build::KernelMaker;
+use crate::calls::call::Call;
 use crate::calls::host_kernel::build_host_kernel;
 use crate::{Kernel, KernelCall};
 use pcadlang_engine::lang::adjoint::Adjoint;
@@ -145,10 +146,8 @@ impl Entry {
         name: impl Into<Cow<'static, str>>,
         make: impl Fn(&mut KernelCall) -> Result<K, Fault> + Send + Sync + 'static,
     ) -> Entry {
-        let make = move |call: &mut KernelCall| -> Result<Box<dyn Kernel>, Fault> {
-            Ok(Box::new(make(call)?))
-        };
-        let maker = KernelMaker::new(move |call| build_host_kernel(call, &make), None);
+        let make = Box::new(move |call: &mut Call| build_host_kernel(call, &make));
+        let maker = KernelMaker { make, check: None };
         Entry::new(name, "Kernels", Type::Kernel, HostItem::Kernel(Arc::new(maker)))
     }
 

@@ -9,19 +9,17 @@
 //! square of the differences between the observed and the simulated numbers.
 
 use super::AbcSmc;
-use super::row::{INNER, KernelRow, number};
-use crate::calls::build::Built;
+use super::row::{Built, INNER, KernelRow, Type, arg, number, opt};
 use crate::calls::error::fail;
 use crate::kernel::{Kernel, Outcome, StepContext};
 use crate::state::{StateError, pack, unpack};
-use pcadlang_engine::lang::builtins::{Type, arg, opt};
 use pcadlang_engine::lang::code::Observed;
 use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::{Draws, Trace, TraceResult};
 use pcadlang_syntax::span::Span;
 use std::sync::Arc;
 
-pub(crate) const ROW: KernelRow = KernelRow::applying(
+pub(crate) const ROW: KernelRow = KernelRow::new(
     "abc",
     &[
         INNER,
@@ -42,7 +40,7 @@ pub(crate) const ROW: KernelRow = KernelRow::applying(
     |call| {
         let inner = call.inner()?;
         let eps = call.positive(1)?.unwrap_or(f64::INFINITY);
-        if !call.is_given(2) {
+        if call.value(2)?.is_none() {
             let signature = format!("abc({}, {eps})", inner.signature);
             return Ok(Built::new(Abc::new(inner.kernel, eps, call.span()), signature));
         }

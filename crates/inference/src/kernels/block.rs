@@ -6,7 +6,7 @@ use crate::kernel::{
 };
 use pcadlang_engine::trace::{Trace, TraceResult};
 
-pub(crate) const ROW: KernelRow = KernelRow::moving(
+pub(crate) const ROW: KernelRow = KernelRow::new(
     "block",
     &[SEL],
     "Metropolis-Hastings that proposes all selected choices jointly from their prior.",
@@ -15,7 +15,7 @@ assume x ~ normal(0, 1) #pair;
 assume y ~ normal(0, 1) #pair;
 observe normal(x + y, 1) = 2 as sum;
 infer { repeat 100 { block($pair); collect x, y; } }",
-    |scope, _| Ok(Box::new(Block::new(scope))),
+    |call| call.moving(|scope, _| Ok(Block::new(scope))),
 );
 
 /// `block(sel)`: proposes all selected choices jointly from their priors. Choices that

@@ -9,17 +9,15 @@
 //! surrogate is, as long as it has positive density wherever the observation has. The
 //! observation itself is evaluated only for moves that pass the first stage.
 
-use super::row::{INNER, KernelRow};
-use crate::calls::build::Built;
+use super::row::{Built, INNER, KernelRow, Type, arg};
 use crate::calls::error::fail;
 use crate::kernel::{Kernel, Outcome, StepContext, accept_or_reject, recoverable};
 use crate::state::StateError;
-use pcadlang_engine::lang::builtins::{Type, arg};
 use pcadlang_engine::lang::error::RunError;
 use pcadlang_engine::trace::{Selector, Trace, TraceResult};
 use pcadlang_syntax::span::Span;
 
-pub(crate) const ROW: KernelRow = KernelRow::applying(
+pub(crate) const ROW: KernelRow = KernelRow::new(
     "delayed",
     &[INNER, arg("at", Type::Selection, "The observation with a coarse surrogate.")],
     "Delayed acceptance: proposals are screened by the surrogate of `observe … with coarse = \

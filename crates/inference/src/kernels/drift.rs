@@ -6,13 +6,12 @@
 //! for a support that depends on another choice of the block. A finite discrete choice
 //! moves to another of its values, an unbounded integer by a few units.
 
-use super::row::{KernelRow, SEL, number};
+use super::row::{KernelRow, SEL, Type, number, opt};
 use super::shape::{MOST, Shape};
 use crate::kernel::{
     Kernel, Outcome, Pick, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
 };
 use crate::state::{StateError, holds, in_order, pack, unpack};
-use pcadlang_engine::lang::builtins::{Type, opt};
 use pcadlang_engine::lang::key::mix;
 use pcadlang_engine::trace::{Change, Target, Trace, TraceResult};
 use pcadlang_numerics::dist::{Datum, Support};
@@ -20,7 +19,7 @@ use pcadlang_numerics::rng::Stream;
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
 
-pub(crate) const ROW: KernelRow = KernelRow::moving(
+pub(crate) const ROW: KernelRow = KernelRow::new(
     "drift",
     &[
         SEL,
@@ -33,7 +32,7 @@ pub(crate) const ROW: KernelRow = KernelRow::moving(
     ],
     "Gaussian random walk in the unconstrained space; discrete choices move to another value.",
     number!("infer { warmup 200 { drift(@x); } repeat 100 { drift(@x); collect x; } }"),
-    |scope, call| Ok(Box::new(Drift::new(scope, call.positive(1)?))),
+    |call| call.moving(|scope, call| Ok(Drift::new(scope, call.positive(1)?))),
 );
 
 /// The target acceptance rates in one dimension and in many (Roberts & Rosenthal 2001).

@@ -14,13 +14,13 @@ use pcadlang_numerics::dist::Datum;
 use pcadlang_numerics::rng::Stream;
 use std::f64::consts::TAU;
 
-pub(crate) const ROW: KernelRow = KernelRow::moving(
+pub(crate) const ROW: KernelRow = KernelRow::new(
     "elliptical",
     &[SEL],
     "Elliptical slice sampling of choices with a Gaussian prior: normal, mv_normal, gp \
      (Murray et al. 2010).",
     number!("infer { repeat 100 { elliptical(@x); collect x; } }"),
-    |scope, _| Ok(Box::new(Elliptical::new(scope))),
+    |call| call.moving(|scope, _| Ok(Elliptical::new(scope))),
 );
 
 /// After this many shrinkage steps the bracket is narrower than the floating-point

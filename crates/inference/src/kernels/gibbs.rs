@@ -15,7 +15,7 @@ use pcadlang_numerics::dist::{Datum, Dist};
 use pcadlang_numerics::num::log_sum_exp;
 use pcadlang_numerics::rng::Stream;
 
-pub(crate) const ROW: KernelRow = KernelRow::moving(
+pub(crate) const ROW: KernelRow = KernelRow::new(
     "gibbs",
     &[SEL],
     "Draws a selected finite discrete choice from its full conditional, by enumeration of \
@@ -26,7 +26,7 @@ for i in 0 .. 4 {
   observe normal(if z[i] { 1 } else { 0 }, 0.5) = 0.8 as y;
 }
 infer { repeat 100 { gibbs(@z[0]); collect z[0]; } }",
-    |scope, _| Ok(Box::new(Gibbs::new(scope))),
+    |call| call.moving(|scope, _| Ok(Gibbs::new(scope))),
 );
 
 /// `gibbs(sel)`: draws one choice from its distribution given all others.

@@ -20,7 +20,7 @@
 //! Densities are relative to the prior's, which cancels the prior terms of
 //! [`Weight::log_weight`](pcadlang_engine::trace::Weight).
 
-use super::row::{KernelRow, SEL};
+use super::row::{KernelRow, SEL, Type, arg, opt};
 use crate::calls::call::Call;
 use crate::calls::error::fail;
 use crate::kernel::{
@@ -28,7 +28,6 @@ use crate::kernel::{
 };
 use crate::neighbours::{Latent, Neighbours};
 use crate::run::RunOptions;
-use pcadlang_engine::lang::builtins::{Type, arg, opt};
 use pcadlang_engine::lang::error::RunError;
 use pcadlang_engine::lang::plan::{Argument, FormulaKind, KernelCall};
 use pcadlang_engine::lang::value::Value;
@@ -41,7 +40,7 @@ use rustc_hash::FxHashMap;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-pub(crate) const ROW: KernelRow = KernelRow::moving(
+pub(crate) const ROW: KernelRow = KernelRow::new(
     "knn",
     &[
         SEL,
@@ -56,7 +55,7 @@ assume r ~ uniform(0.5, 1.5);
 let view = scene.render(scene.sphere(r));
 observe scene.chamfer(view, size = 32) = photo as picture;
 infer { repeat 100 { knn(@**, bank = \"balls.bank\", k = 5); collect r; } }",
-    |scope, call| Ok(Box::new(Knn::new(scope, neighbours(call)?))),
+    |call| call.moving(|scope, call| Ok(Knn::new(scope, neighbours(call)?))),
 )
 .checked(check);
 
@@ -184,7 +183,7 @@ fn neighbours(call: &mut Call) -> Result<Arc<Neighbours>, Box<RunError>> {
         Some((Value::Num(x), span)) => count(x).ok_or_else(|| wrong(Value::Num(x), span))?,
         Some((v, span)) => return Err(wrong(v, span)),
     };
-    find(call.options(), call.span(), &bank, k)
+    find(call.setting.options, call.span(), &bank, k)
 }
 
 /// The bandwidth of each coordinate: Silverman's rule (1986, equation 3.28) over the

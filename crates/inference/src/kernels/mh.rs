@@ -7,12 +7,12 @@ use crate::kernel::{
 };
 use pcadlang_engine::trace::{Change, Trace, TraceResult};
 
-pub(crate) const ROW: KernelRow = KernelRow::moving(
+pub(crate) const ROW: KernelRow = KernelRow::new(
     "mh",
     &[SEL],
     "Metropolis-Hastings that proposes a single selected choice from its prior.",
     number!("infer { repeat 100 { mh(@x); collect x; } }"),
-    |scope, _| Ok(Box::new(Mh::new(scope))),
+    |call| call.moving(|scope, _| Ok(Mh::new(scope))),
 );
 
 /// `mh(sel)`: proposes one choice from its prior, given the rest.

@@ -1,12 +1,11 @@
 //! The rows in which kernels are declared: constants that are converted to entries of the
 //! table of built-ins.
 
-use crate::calls::build::{Built, Check, KernelMaker};
+pub(super) use crate::calls::build::Built;
+use crate::calls::build::{Check, KernelMaker};
 use crate::calls::call::Call;
-use crate::kernel::{Kernel, SiteSelection};
-use pcadlang_engine::lang::builtins::{
-    Arg, Builtin, HostItem, KernelTraits, Kind, PlanForm, Row, Type, arg, opt,
-};
+use pcadlang_engine::lang::builtins::{Arg, Builtin, HostItem, KernelTraits, Kind, PlanForm, Row};
+pub(super) use pcadlang_engine::lang::builtins::{Type, arg, opt};
 use pcadlang_engine::lang::error::RunError;
 use std::sync::Arc;
 
@@ -23,19 +22,11 @@ pub(crate) struct KernelRow {
     check: Option<Check>,
 }
 
-/// Makes a kernel that moves the choices of its first argument.
-type Moving = fn(SiteSelection, &mut Call) -> Result<Box<dyn Kernel>, Box<RunError>>;
-/// Makes a kernel that applies the one of its first argument.
-type Applying = fn(&mut Call) -> Result<Built, Box<RunError>>;
-
-#[derive(Clone, Copy)]
-enum Make {
-    Moving(Moving),
-    Applying(Applying),
-}
+/// Makes a kernel from its call.
+type Make = fn(&mut Call) -> Result<Built, Box<RunError>>;
 
 impl KernelRow {
-    const fn new(
+    pub const fn new(
         name: &'static str,
         args: &'static [Arg],
         doc: &'static str,
@@ -46,44 +37,22 @@ impl KernelRow {
         KernelRow { name, args, doc, example, traits, make, check: None }
     }
 
-    /// A kernel that moves the choices of its first argument. Calls with the same text,
-    /// choices and values share one.
-    pub const fn moving(
-        name: &'static str,
-        args: &'static [Arg],
-        doc: &'static str,
-        example: &'static str,
-        make: Moving,
-    ) -> KernelRow {
-        KernelRow::new(name, args, doc, example, Make::Moving(make))
-    }
-
-    /// A kernel that applies the one of its first argument.
-    pub const fn applying(
-        name: &'static str,
-        args: &'static [Arg],
-        doc: &'static str,
-        example: &'static str,
-        make: Applying,
-    ) -> KernelRow {
-        KernelRow::new(name, args, doc, example, Make::Applying(make))
-    }
-
     /// Declares that a step is not a reversible move of one state.
-    pub const fn irreversible(self) -> KernelRow {
-        let traits = KernelTraits { irreversible: true, ..self.traits };
-        KernelRow { traits, ..self }
+    pub const fn irreversible(mut self) -> KernelRow {
+        self.traits.irreversible = true;
+        self
     }
 
     /// Takes only reversible kernels, as in this call.
-    pub const fn of_reversible(self, example: &'static str) -> KernelRow {
-        let traits = KernelTraits { of_reversible: Some(example), ..self.traits };
-        KernelRow { traits, ..self }
+    pub const fn of_reversible(mut self, example: &'static str) -> KernelRow {
+        self.traits.of_reversible = Some(example);
+        self
     }
 
     /// Adds a check of calls before the chain begins.
-    pub const fn checked(self, check: Check) -> KernelRow {
-        KernelRow { check: Some(check), ..self }
+    pub const fn checked(mut self, check: Check) -> KernelRow {
+        self.check = Some(check);
+        self
     }
 }
 
@@ -91,16 +60,7 @@ impl From<&KernelRow> for Builtin {
     fn from(k: &KernelRow) -> Builtin {
         let kind = Kind::Plan(PlanForm::Kernel(k.traits));
         let row = Row::new(kind, k.name, "Kernels", k.args, Type::Kernel, k.doc);
-        let maker = match k.make {
-            Make::Applying(make) => KernelMaker::new(make, k.check),
-            Make::Moving(make) => {
-                let make = move |call: &mut Call| {
-                    let (scope, signature) = call.moved()?;
-                    Ok(Built { kernel: make(scope, call)?, signature })
-                };
-                KernelMaker::new(make, k.check)
-            }
-        };
+        let maker = KernelMaker { make: Box::new(k.make), check: k.check };
         Builtin {
             host: Some(HostItem::Kernel(Arc::new(maker))),
             example: Some(k.example.into()),

@@ -6,15 +6,14 @@
 //! program is undefined, or choices appear or vanish, counts as outside the slice, so the
 //! kernel moves within the present structure.
 
-use super::row::{KernelRow, SEL, number};
+use super::row::{KernelRow, SEL, Type, number, opt};
 use crate::kernel::{Kernel, Outcome, Registered, SiteSelection, StepContext, recoverable};
 use crate::state::{StateError, in_order, pack, unpack};
-use pcadlang_engine::lang::builtins::{Type, opt};
 use pcadlang_engine::trace::{Change, Target, Trace, TraceResult};
 use pcadlang_numerics::rng::Stream;
 use rustc_hash::FxHashMap;
 
-pub(crate) const ROW: KernelRow = KernelRow::moving(
+pub(crate) const ROW: KernelRow = KernelRow::new(
     "slice",
     &[
         SEL,
@@ -35,7 +34,7 @@ pub(crate) const ROW: KernelRow = KernelRow::moving(
     ],
     "Slice sampling of one number at a time with stepping out or doubling (Neal 2003).",
     number!("infer { repeat 100 { slice(@x, width = 2); collect x; } }"),
-    |scope, call| Ok(Box::new(Slice::new(scope, call.positive(1)?, call.truth(2)?))),
+    |call| call.moving(|scope, call| Ok(Slice::new(scope, call.positive(1)?, call.truth(2)?))),
 );
 
 /// The most widths of stepping out, divided at random between both sides, which keeps the

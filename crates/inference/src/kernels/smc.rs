@@ -11,17 +11,15 @@
 //! each, and are fixed from then on.
 
 use super::particles::{Independent, ParticlePath, Prior};
-use super::row::{INNER, KernelRow, number};
-use crate::calls::build::Built;
+use super::row::{Built, INNER, KernelRow, Type, number, opt};
 use crate::kernel::{Kernel, StepContext, inner_step};
 use crate::resampling::systematic;
 use crate::state::{StateError, holds, pack, unpack};
-use pcadlang_engine::lang::builtins::{Type, opt};
 use pcadlang_engine::trace::{Selector, Trace, TraceResult};
 use pcadlang_numerics::num::log_sum_exp;
 use pcadlang_syntax::span::Span;
 
-pub(crate) const ROW: KernelRow = KernelRow::applying(
+pub(crate) const ROW: KernelRow = KernelRow::new(
     "smc",
     &[INNER, opt("particles", Type::Int, "100", "The number of particles.")],
     "Proposes complete states by annealed sequential Monte Carlo with the inner kernel, \

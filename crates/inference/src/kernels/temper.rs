@@ -7,14 +7,12 @@
 //! even and odd pairs (Okabe et al. 2001). In warm-up the powers are adapted so that all
 //! neighbours swap about equally often (Miasojedow, Moulines & Vihola 2013).
 
-use super::row::{INNER, KernelRow, number};
-use crate::calls::build::Built;
+use super::row::{Built, INNER, KernelRow, Type, number, opt};
 use crate::kernel::{Kernel, Outcome, StepContext, accepts, inner_step};
 use crate::state::{StateError, holds, pack, unpack};
-use pcadlang_engine::lang::builtins::{Type, opt};
 use pcadlang_engine::trace::{Constraint, Trace, TraceResult};
 
-pub(crate) const ROW: KernelRow = KernelRow::applying(
+pub(crate) const ROW: KernelRow = KernelRow::new(
     "temper",
     &[
         INNER,

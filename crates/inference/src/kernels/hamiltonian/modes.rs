@@ -14,15 +14,14 @@ use super::system::System;
 use crate::kernel::{
     Kernel, Outcome, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
 };
-use crate::kernels::row::{KernelRow, SEL, number};
+use crate::kernels::row::{KernelRow, SEL, Type, number, opt};
 use crate::state::{StateError, pack, unpack};
-use pcadlang_engine::lang::builtins::{Type, opt};
 use pcadlang_engine::trace::{Change, Constraint, Selector, Target, Trace, TraceResult};
 use pcadlang_numerics::dist::Datum;
 use pcadlang_numerics::rng::Stream;
 use serde::{Deserialize, Serialize};
 
-pub(crate) const ROW: KernelRow = KernelRow::moving(
+pub(crate) const ROW: KernelRow = KernelRow::new(
     "modes",
     &[
         SEL,
@@ -62,12 +61,14 @@ pub(crate) const ROW: KernelRow = KernelRow::moving(
      proposed jointly from a mixture of Laplace approximations at the modes (independent \
      Metropolis-Hastings, Tierney 1994).",
     number!("infer { warmup 20 { modes(@x); } repeat 100 { modes(@x); collect x; } }"),
-    |scope, call| {
-        let tries = call.whole(1, 200, 1, 1_000_000)?;
-        let keep = call.whole(2, 16, 1, 1000)?;
-        let steps = call.whole(3, 60, 1, 1_000_000)?;
-        let modes = Modes::new(scope, tries, keep, steps).climbing_first(call.scope(4)?);
-        Ok(Box::new(modes.by_surrogates_of(call.selector(5)?)))
+    |call| {
+        call.moving(|scope, call| {
+            let tries = call.whole(1, 200, 1, 1_000_000)?;
+            let keep = call.whole(2, 16, 1, 1000)?;
+            let steps = call.whole(3, 60, 1, 1_000_000)?;
+            let modes = Modes::new(scope, tries, keep, steps).climbing_first(call.scope(4)?);
+            Ok(modes.by_surrogates_of(call.selector(5)?))
+        })
     },
 );
 

@@ -6,14 +6,13 @@ use super::kernel::{DIVERGENT, End, Hamiltonian, Path, Trajectory};
 use super::point::Point;
 use super::system::System;
 use crate::kernel::SiteSelection;
-use crate::kernels::row::{KernelRow, MARGINAL, SEL, number};
-use pcadlang_engine::lang::builtins::{Type, opt};
+use crate::kernels::row::{KernelRow, MARGINAL, SEL, Type, number, opt};
 use pcadlang_engine::trace::TraceResult;
 use pcadlang_numerics::num::log_sum_exp;
 use pcadlang_numerics::rng::Stream;
 use std::sync::Arc;
 
-pub(crate) const ROW: KernelRow = KernelRow::moving(
+pub(crate) const ROW: KernelRow = KernelRow::new(
     "nuts",
     &[
         SEL,
@@ -27,9 +26,11 @@ pub(crate) const ROW: KernelRow = KernelRow::moving(
     ],
     "The No-U-Turn sampler (Hoffman and Gelman 2014).",
     number!("infer { warmup 200 { nuts(@x); } repeat 100 { nuts(@x); collect x; } }"),
-    |scope, call| {
-        let depth = call.whole(1, 10, 1, 20)?;
-        Ok(Box::new(Nuts::new(scope, depth).summing_out(call.marginal(2)?)))
+    |call| {
+        call.moving(|scope, call| {
+            let depth = call.whole(1, 10, 1, 20)?;
+            Ok(Nuts::new(scope, depth).summing_out(call.marginal(2)?))
+        })
     },
 );
 
