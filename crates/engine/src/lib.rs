@@ -14,3 +14,7 @@ pub mod trace;
 // The helpers of unit tests are shared with the crate above.
 #[cfg(test)]
 extern crate self as pcadlang_engine;
+#[cfg(test)]
+fn table() -> lang::builtins::Table {
+    lang::builtins::Table::default()
+}

@@ -1,6 +1,5 @@
 //! For unit tests: programs of numbers, from their text.
 
-use pcadlang_engine::lang::builtins::Table;
 use pcadlang_engine::lang::load::{Nowhere, load_text};
 use pcadlang_engine::lang::lower::{Compiled, Inputs, compile};
 use pcadlang_engine::trace::{Draws, Limits, Trace};
@@ -13,7 +12,7 @@ pub fn compiled(text: &str) -> Compiled {
     let mut sources = SourceMap::new();
     let done = load_text("<program>", text, &Nowhere, &mut sources).and_then(|loaded| {
         let inputs = Inputs {
-            builtins: Arc::new(Table::default()),
+            builtins: Arc::new(crate::table()),
             sets: &[],
             data: Default::default(),
             read: &|_, path, _, _| panic!("{path} is read"),

@@ -38,7 +38,6 @@ mod testing;
 pub use callback::{Callback, Callbacks};
 pub use calls::explained::{Selecting, selecting};
 pub use calls::host_kernel::KernelCall;
-pub(crate) use calls::host_kernel::KernelMaker;
 pub use calls::selection::{not_a_selection, selected};
 pub use chains::run_chains;
 pub use default_plan::default_plan;
@@ -52,7 +51,7 @@ pub use init::{Start, StartError, starts};
 pub use kernel::accepts;
 pub use kernel::{Kernel, Outcome, Pick, SiteSelection, StepContext, decide, recoverable};
 pub use kernels::{
-    Abc, AbcSmc, Delayed, Hamiltonian, Hmc, Independent, Knn, Nuts, Optimize, Smc, Temper,
+    Abc, AbcSmc, Delayed, Hamiltonian, Hmc, Independent, Knn, Nuts, Optimize, Smc, Temper, table,
 };
 pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh, Slice};
 pub use neighbours::{Banks, Latent, Latents, Neighbours};

@@ -4,9 +4,8 @@ use pcadlang_engine::lang::builtins::Table;
 use std::sync::{Arc, LazyLock};
 
 static TABLE: LazyLock<Arc<Table>> = LazyLock::new(|| {
-    let language = Table::default();
-    let language = crate::scene::host().added_to(&language);
-    Arc::new(language)
+    let language = pcadlang_inference::table();
+    Arc::new(crate::scene::host().added_to(&language))
 });
 
 /// The table of all built-ins, without those of hosts.

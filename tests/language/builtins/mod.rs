@@ -33,7 +33,7 @@ fn try_call(name: &str, values: &[Value]) -> Result<Value, Fault> {
     match builtin.kind {
         Kind::Function(f) => f(&args),
         Kind::Distribution(f) => f(&args).map(|d| Value::Dist(d.into())),
-        Kind::Form(_) | Kind::Inference(_) => panic!("{name} is no function"),
+        Kind::Form(_) | Kind::Plan(_) => panic!("{name} is no function"),
     }
 }
 

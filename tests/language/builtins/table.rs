@@ -62,7 +62,7 @@ const KEYWORDS: &[&str] = &[
 #[test]
 fn every_entry_is_well_formed() {
     let mut seen = HashSet::new();
-    for b in Table::default().iter() {
+    for b in pcadlang_inference::table().iter() {
         let name = b.full_name();
         assert!(seen.insert(name.clone()), "{name} is there twice");
         assert!(!KEYWORDS.contains(&&*b.name), "{name} is a keyword");

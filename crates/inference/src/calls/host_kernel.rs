@@ -1,14 +1,21 @@
 //! Kernels that a host defines: their calls in inference blocks, and their constructors.
 
+use crate::calls::build::{Built, build};
+use crate::calls::call::Call;
+use crate::calls::error::fault;
+use crate::calls::formula::evaluate;
 use crate::kernel::{Kernel, SiteSelection};
+use crate::plain::Plain;
 use pcadlang_engine::lang::builtins::Args;
-use pcadlang_engine::lang::error::Fault;
+use pcadlang_engine::lang::error::{Fault, RunError};
+use pcadlang_engine::lang::plan::Argument;
+use pcadlang_engine::lang::value::Value;
 
 /// A call of a host's kernel in an `infer` block, with its arguments evaluated.
 pub struct KernelCall<'a> {
-    pub(super) args: Args<'a>,
-    pub(super) scopes: Vec<Option<SiteSelection>>,
-    pub(super) kernels: Vec<Option<Box<dyn Kernel>>>,
+    args: Args<'a>,
+    scopes: Vec<Option<SiteSelection>>,
+    kernels: Vec<Option<Box<dyn Kernel>>>,
 }
 
 impl KernelCall<'_> {
@@ -40,16 +47,40 @@ impl KernelCall<'_> {
     }
 }
 
-type Make = dyn Fn(&mut KernelCall) -> Result<Box<dyn Kernel>, Fault> + Send + Sync;
-
-/// Constructs a host's kernel from its call; stored with its entry in the table of
-/// built-ins.
-pub(crate) struct KernelMaker(pub(super) Box<Make>);
-
-impl KernelMaker {
-    pub fn new(
-        make: impl Fn(&mut KernelCall) -> Result<Box<dyn Kernel>, Fault> + Send + Sync + 'static,
-    ) -> KernelMaker {
-        KernelMaker(Box::new(make))
+/// Makes a host's kernel: evaluates all arguments, and leaves the rest to `make`.
+///
+/// # Errors
+/// What is wrong with the call, with its position.
+pub(crate) fn build_host_kernel<K: Kernel + 'static>(
+    call: &mut Call,
+    make: impl Fn(&mut KernelCall) -> Result<K, Fault>,
+) -> Result<Built, Box<RunError>> {
+    let (mut values, mut scopes, mut kernels) = (Vec::new(), Vec::new(), Vec::new());
+    let mut signature = call.call.text.to_string();
+    for (place, arg) in call.call.args.iter().enumerate() {
+        let (mut value, mut selected, mut inner) = (Value::Unit, None, None);
+        match arg {
+            Argument::Omitted => {}
+            Argument::Choices(_) => {
+                selected = call.scope(place)?;
+                signature += &selected.iter().map(|s| format!(" {s:?}")).collect::<String>();
+            }
+            Argument::Kernel(arg) => {
+                let built = build(arg, call.setting, call.env)?;
+                signature += &format!(" {}", built.signature);
+                inner = Some(built.kernel);
+            }
+            Argument::Value(f) => {
+                value = evaluate(f, call.env)?;
+                signature += &format!(" {:?}", Plain::of(&value));
+            }
+        }
+        values.push(value);
+        scopes.push(selected);
+        kernels.push(inner);
     }
+    let values: Vec<&Value> = values.iter().collect();
+    let args = Args { builtin: call.builtin, values: &values };
+    let made = make(&mut KernelCall { args, scopes, kernels });
+    Ok(Built::new(made.map_err(|f| fault(call.span(), f))?, signature))
 }

@@ -2,7 +2,10 @@
 
 use super::Previous;
 use super::checked::Checked;
-use crate::{Kernel, KernelCall, KernelMaker};
+use crate::calls::build::KernelMaker;
+use crate::calls::call::Call;
+use crate::calls::host_kernel::build_host_kernel;
+use crate::{Kernel, KernelCall};
 use pcadlang_engine::lang::adjoint::Adjoint;
 use pcadlang_engine::lang::builtins::data::{self, DataFormat};
 use pcadlang_engine::lang::builtins::{
@@ -10,7 +13,7 @@ use pcadlang_engine::lang::builtins::{
 };
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_engine::lang::value::{Likelihood, Value};
-use pcadlang_numerics::dist::{Dist, Distribution};
+use pcadlang_numerics::dist::{Dist, Distribution, Drawn};
 use pcadlang_syntax::{is_keyword, is_name};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -58,6 +61,7 @@ impl Entry {
             doc: "Of the host.".into(),
             kind,
             scalar: None,
+            drawn: Drawn::Unknown,
             derivative: Derivative::Unknown,
             host: None,
             format: None,
@@ -142,7 +146,8 @@ impl Entry {
         name: impl Into<Cow<'static, str>>,
         make: impl Fn(&mut KernelCall) -> Result<K, Fault> + Send + Sync + 'static,
     ) -> Entry {
-        let maker = KernelMaker::new(move |call| Ok(Box::new(make(call)?)));
+        let make = Box::new(move |call: &mut Call| build_host_kernel(call, &make));
+        let maker = KernelMaker { make, check: None };
         Entry::new(name, "Kernels", Type::Kernel, HostItem::Kernel(Arc::new(maker)))
     }
 

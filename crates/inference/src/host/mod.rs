@@ -109,9 +109,9 @@ impl Host {
         }
     }
 
-    /// What `pcadlang doc` says of a name: the host's own, or the engine's. `None` also
+    /// What `pcadlang doc` says of a name: the host's own, or the language's. `None` also
     /// where an entry is not valid.
     pub fn doc(&self, name: &str) -> Option<String> {
-        doc::doc(&*self.table(&Table::default()).ok()?, name)
+        doc::doc(&*self.table(&crate::table()).ok()?, name)
     }
 }

@@ -8,6 +8,8 @@
 //! the observed data: the posterior, as `eps` goes to 0. The distance is the root mean
 //! square of the differences between the observed and the simulated numbers.
 
+use super::AbcSmc;
+use super::row::{Built, INNER, KernelRow, Type, arg, number, opt};
 use crate::calls::error::fail;
 use crate::kernel::{Kernel, Outcome, StepContext};
 use crate::state::{StateError, pack, unpack};
@@ -16,6 +18,39 @@ use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::{Draws, Trace, TraceResult};
 use pcadlang_syntax::span::Span;
 use std::sync::Arc;
+
+pub(crate) const ROW: KernelRow = KernelRow::new(
+    "abc",
+    &[
+        INNER,
+        arg("eps", Type::Num, "The tolerance: the largest accepted distance."),
+        opt(
+            "particles",
+            Type::Int,
+            "none",
+            "With this many particles, each step draws a complete state as `smc` does, with \
+             tolerances decreasing to `eps` (Del Moral et al. 2012).",
+        ),
+        opt("moves", Type::Int, "1", "The number of moves of each particle at each tolerance."),
+    ],
+    "Approximate Bayesian computation (likelihood-free): the inner kernel targets the prior, \
+     and a proposal is accepted if data simulated from it are within `eps` of the observed \
+     data in root mean square (Marjoram et al. 2003).",
+    number!("infer { repeat 100 { abc(block(@**), eps = 0.5); collect x; } }"),
+    |call| {
+        let inner = call.inner()?;
+        let eps = call.positive(1)?.unwrap_or(f64::INFINITY);
+        if call.value(2)?.is_none() {
+            let signature = format!("abc({}, {eps})", inner.signature);
+            return Ok(Built::new(Abc::new(inner.kernel, eps, call.span()), signature));
+        }
+        let (particles, moves) = (call.whole(2, 100, 2, 1_000_000)?, call.whole(3, 1, 1, 10_000)?);
+        let signature = format!("abc({}, {eps}, {particles}, {moves})", inner.signature);
+        let (size, frozen) = ((particles as usize, moves), call.frozen());
+        Ok(Built::new(AbcSmc::new(inner.kernel, eps, size, frozen, call.span()), signature))
+    },
+)
+.irreversible();
 
 /// Likelihood-free Metropolis-Hastings with a reversible inner kernel that leaves the
 /// prior invariant.

@@ -1,9 +1,22 @@
 //! Blocked Metropolis-Hastings from the prior: q_block (Kulkarni et al. 2014, section 3).
 
+use super::row::{KernelRow, SEL};
 use crate::kernel::{
     Kernel, Outcome, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
 };
 use pcadlang_engine::trace::{Trace, TraceResult};
+
+pub(crate) const ROW: KernelRow = KernelRow::new(
+    "block",
+    &[SEL],
+    "Metropolis-Hastings that proposes all selected choices jointly from their prior.",
+    "\
+assume x ~ normal(0, 1) #pair;
+assume y ~ normal(0, 1) #pair;
+observe normal(x + y, 1) = 2 as sum;
+infer { repeat 100 { block($pair); collect x, y; } }",
+    |call| call.moving(|scope, _| Ok(Block::new(scope))),
+);
 
 /// `block(sel)`: proposes all selected choices jointly from their priors. Choices that
 /// appear or vanish as a result are accounted for in the acceptance ratio, so the

@@ -9,12 +9,32 @@
 //! surrogate is, as long as it has positive density wherever the observation has. The
 //! observation itself is evaluated only for moves that pass the first stage.
 
+use super::row::{Built, INNER, KernelRow, Type, arg};
 use crate::calls::error::fail;
 use crate::kernel::{Kernel, Outcome, StepContext, accept_or_reject, recoverable};
 use crate::state::StateError;
 use pcadlang_engine::lang::error::RunError;
 use pcadlang_engine::trace::{Selector, Trace, TraceResult};
 use pcadlang_syntax::span::Span;
+
+pub(crate) const ROW: KernelRow = KernelRow::new(
+    "delayed",
+    &[INNER, arg("at", Type::Selection, "The observation with a coarse surrogate.")],
+    "Delayed acceptance: proposals are screened by the surrogate of `observe … with coarse = \
+     …`; only those that pass are evaluated under the observation itself (Christen and Fox \
+     2005). Exact for any surrogate that is positive wherever the likelihood is.",
+    "\
+assume x ~ normal(0, 1);
+observe normal(x, 1) = 2 with coarse = normal(x, 1.5) as y;
+infer { repeat 100 { delayed(mh(@x), at = @y); collect x; } }",
+    |call| {
+        let inner = call.inner()?;
+        let at = call.selector(1)?;
+        let signature = format!("delayed({}, {at:?})", inner.signature);
+        Ok(Built::new(Delayed::new(inner.kernel, at, call.span()), signature))
+    },
+)
+.of_reversible("delayed(drift(@x), @obs)");
 
 /// Two-stage acceptance with a reversible inner kernel.
 pub struct Delayed {

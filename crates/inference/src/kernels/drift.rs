@@ -6,6 +6,7 @@
 //! for a support that depends on another choice of the block. A finite discrete choice
 //! moves to another of its values, an unbounded integer by a few units.
 
+use super::row::{KernelRow, SEL, Type, number, opt};
 use super::shape::{MOST, Shape};
 use crate::kernel::{
     Kernel, Outcome, Pick, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
@@ -17,6 +18,22 @@ use pcadlang_numerics::dist::{Datum, Support};
 use pcadlang_numerics::rng::Stream;
 use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
+
+pub(crate) const ROW: KernelRow = KernelRow::new(
+    "drift",
+    &[
+        SEL,
+        opt(
+            "scale",
+            Type::Num,
+            "learnt",
+            "A fixed step size in the unconstrained space, instead of one adapted in warm-up.",
+        ),
+    ],
+    "Gaussian random walk in the unconstrained space; discrete choices move to another value.",
+    number!("infer { warmup 200 { drift(@x); } repeat 100 { drift(@x); collect x; } }"),
+    |call| call.moving(|scope, call| Ok(Drift::new(scope, call.positive(1)?))),
+);
 
 /// The target acceptance rates in one dimension and in many (Roberts & Rosenthal 2001).
 const ONE_D: f64 = 0.44;

@@ -6,12 +6,22 @@
 //! choices appear or vanish count as outside the slice: the kernel moves within the
 //! present structure, and leaves the posterior given that structure invariant.
 
+use super::row::{KernelRow, SEL, number};
 use crate::kernel::{Kernel, Outcome, Registered, SiteSelection, StepContext, recoverable};
 use pcadlang_engine::lang::error::{FaultKind, RunError};
 use pcadlang_engine::trace::{Change, Target, Trace, TraceResult};
 use pcadlang_numerics::dist::Datum;
 use pcadlang_numerics::rng::Stream;
 use std::f64::consts::TAU;
+
+pub(crate) const ROW: KernelRow = KernelRow::new(
+    "elliptical",
+    &[SEL],
+    "Elliptical slice sampling of choices with a Gaussian prior: normal, mv_normal, gp \
+     (Murray et al. 2010).",
+    number!("infer { repeat 100 { elliptical(@x); collect x; } }"),
+    |call| call.moving(|scope, _| Ok(Elliptical::new(scope))),
+);
 
 /// After this many shrinkage steps the bracket is narrower than the floating-point
 /// resolution.

@@ -6,6 +6,7 @@
 //! Wong (2000), with one try per value: the acceptance ratio uses the weights around the
 //! new state, with fresh draws for all values but the old one.
 
+use super::row::{KernelRow, SEL};
 use crate::kernel::{
     Kernel, Outcome, Registered, SiteSelection, StepContext, accepts, recoverable,
 };
@@ -13,6 +14,20 @@ use pcadlang_engine::trace::{Change, Target, Trace, TraceResult};
 use pcadlang_numerics::dist::{Datum, Dist};
 use pcadlang_numerics::num::log_sum_exp;
 use pcadlang_numerics::rng::Stream;
+
+pub(crate) const ROW: KernelRow = KernelRow::new(
+    "gibbs",
+    &[SEL],
+    "Draws a selected finite discrete choice from its full conditional, by enumeration of \
+     its values.",
+    "\
+for i in 0 .. 4 {
+  z[i] ~ flip(0.3);
+  observe normal(if z[i] { 1 } else { 0 }, 0.5) = 0.8 as y;
+}
+infer { repeat 100 { gibbs(@z[0]); collect z[0]; } }",
+    |call| call.moving(|scope, _| Ok(Gibbs::new(scope))),
+);
 
 /// `gibbs(sel)`: draws one choice from its distribution given all others.
 #[derive(Clone, Debug)]

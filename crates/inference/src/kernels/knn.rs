@@ -20,17 +20,49 @@
 //! Densities are relative to the prior's, which cancels the prior terms of
 //! [`Weight::log_weight`](pcadlang_engine::trace::Weight).
 
+use super::row::{KernelRow, SEL, Type, arg, opt};
+use crate::calls::call::Call;
+use crate::calls::error::fail;
 use crate::kernel::{
     Kernel, Outcome, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
 };
 use crate::neighbours::{Latent, Neighbours};
+use crate::run::RunOptions;
+use pcadlang_engine::lang::error::RunError;
+use pcadlang_engine::lang::plan::{Argument, FormulaKind, KernelCall};
+use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::{Change, Target, Trace, TraceResult};
 use pcadlang_numerics::dist::{Datum, Support};
 use pcadlang_numerics::num::log_sum_exp;
 use pcadlang_numerics::rng::Stream;
+use pcadlang_syntax::span::Span;
 use rustc_hash::FxHashMap;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
+
+pub(crate) const ROW: KernelRow = KernelRow::new(
+    "knn",
+    &[
+        SEL,
+        arg("bank", Type::Str, "A file made by `pcadlang learn`."),
+        opt("k", Type::Int, "10", "The number of neighbours."),
+    ],
+    "Data-driven independence proposal: a kernel density estimate over the latents of the \
+     bank's pictures nearest to the observed one.",
+    "\
+data photo = image(\"ball.png\");
+assume r ~ uniform(0.5, 1.5);
+let view = scene.render(scene.sphere(r));
+observe scene.chamfer(view, size = 32) = photo as picture;
+infer { repeat 100 { knn(@**, bank = \"balls.bank\", k = 5); collect r; } }",
+    |call| call.moving(|scope, call| Ok(Knn::new(scope, neighbours(call)?))),
+)
+.checked(check);
+
+/// The number of neighbours, if a call does not specify it.
+const K: usize = 10;
+/// The most neighbours: more of them are no more informative than the prior.
+const MOST: f64 = 10_000.0;
 
 /// The weight of the prior in the mixture, so that the proposal covers the support of the
 /// posterior.
@@ -95,6 +127,63 @@ impl Knn {
         let c = self.component(rng.index(count));
         places.iter().map(|p| c.draw(p, rng)).collect()
     }
+}
+
+/// Looks up the neighbours that a call will need, so that an unusable bank is an error
+/// before the chain begins. A bank whose name is computed is looked up when the kernel is
+/// made.
+fn check(call: &KernelCall, options: &RunOptions) -> Result<(), Box<RunError>> {
+    let written = |place| match call.args.get(place) {
+        Some(Argument::Value(f)) => Some(&f.kind),
+        _ => None,
+    };
+    let k = match written(2) {
+        None => K,
+        Some(FormulaKind::Const(Value::Num(x))) => count(*x).unwrap_or(K),
+        Some(_) => return Ok(()),
+    };
+    match written(1) {
+        Some(FormulaKind::Const(Value::Str(bank))) => find(options, call.span, bank, k).map(|_| ()),
+        _ => Ok(()),
+    }
+}
+
+fn count(x: f64) -> Option<usize> {
+    ((1.0..=MOST).contains(&x) && x == libm::trunc(x)).then_some(x as usize)
+}
+
+fn find(
+    options: &RunOptions,
+    span: Span,
+    bank: &str,
+    k: usize,
+) -> Result<Arc<Neighbours>, Box<RunError>> {
+    match &options.banks {
+        Some(banks) => banks.neighbours(bank, k).map_err(|message| fail(span, message)),
+        None => Err(fail(span, format!("knn: the bank {bank:?} is not known to this run"))),
+    }
+}
+
+/// Looks up the neighbours for a call.
+///
+/// # Errors
+/// If its arguments are wrong, or the bank cannot be used.
+fn neighbours(call: &mut Call) -> Result<Arc<Neighbours>, Box<RunError>> {
+    let bank = match call.value(1)? {
+        Some((Value::Str(bank), _)) => bank,
+        Some((v, span)) => {
+            return Err(fail(span, format!("knn: `bank` must be a string, got {v}")));
+        }
+        None => return Err(fail(call.span(), "knn needs a bank made by `pcadlang learn`".into())),
+    };
+    let wrong =
+        |v, span| fail(span, format!("knn: `k` must be a whole number from 1 to {MOST}, got {v}"));
+    let k = match call.value(2)? {
+        None => K,
+        Some((Value::Num(x), span)) => count(x).ok_or_else(|| wrong(Value::Num(x), span))?,
+        Some((v, span)) => return Err(wrong(v, span)),
+    };
+    find(call.setting.options, call.span(), &bank, k)
 }
 
 /// The bandwidth of each coordinate: Silverman's rule (1986, equation 3.28) over the

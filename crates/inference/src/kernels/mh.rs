@@ -1,10 +1,19 @@
 //! Single-site Metropolis-Hastings from the prior: q_single of Kulkarni et al. 2014,
 //! section 3.
 
+use super::row::{KernelRow, SEL, number};
 use crate::kernel::{
     Kernel, Outcome, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
 };
 use pcadlang_engine::trace::{Change, Trace, TraceResult};
+
+pub(crate) const ROW: KernelRow = KernelRow::new(
+    "mh",
+    &[SEL],
+    "Metropolis-Hastings that proposes a single selected choice from its prior.",
+    number!("infer { repeat 100 { mh(@x); collect x; } }"),
+    |call| call.moving(|scope, _| Ok(Mh::new(scope))),
+);
 
 /// `mh(sel)`: proposes one choice from its prior, given the rest.
 #[derive(Clone, Debug)]

@@ -1,4 +1,4 @@
-//! The kernels, one per file.
+//! The kernels, one per file, and their list.
 
 mod abc;
 mod abc_smc;
@@ -13,6 +13,7 @@ mod knn;
 mod mh;
 mod particles;
 mod program_kernel;
+mod row;
 mod shape;
 mod slice;
 mod smc;
@@ -25,7 +26,7 @@ pub use delayed::Delayed;
 pub use drift::Drift;
 pub use elliptical::Elliptical;
 pub use gibbs::Gibbs;
-pub use hamiltonian::{Hamiltonian, Hmc, Modes, Nuts, Optimize};
+pub use hamiltonian::{Hamiltonian, Hmc, Nuts, Optimize};
 pub use knn::Knn;
 pub use mh::Mh;
 pub use particles::Independent;
@@ -33,3 +34,32 @@ pub(crate) use program_kernel::ProgramKernel;
 pub use slice::Slice;
 pub use smc::Smc;
 pub use temper::Temper;
+
+use hamiltonian::{hmc, mala, modes, nuts, optimize};
+use pcadlang_engine::lang::builtins::{Builtin, Table};
+use row::KernelRow;
+
+/// The kernels of the language, in the order of the reference.
+const ROWS: &[KernelRow] = &[
+    mh::ROW,
+    block::ROW,
+    drift::ROW,
+    gibbs::ROW,
+    elliptical::ROW,
+    slice::ROW,
+    hmc::ROW,
+    nuts::ROW,
+    mala::ROW,
+    knn::ROW,
+    delayed::ROW,
+    temper::ROW,
+    smc::ROW,
+    abc::ROW,
+    modes::ROW,
+    optimize::ROW,
+];
+
+/// The built-ins of the language, kernels included.
+pub fn table() -> Table {
+    Table::with_kernels(ROWS.iter().map(Builtin::from))
+}

@@ -7,9 +7,42 @@
 //! even and odd pairs (Okabe et al. 2001). In warm-up the powers are adapted so that all
 //! neighbours swap about equally often (Miasojedow, Moulines & Vihola 2013).
 
+use super::row::{Built, INNER, KernelRow, Type, number, opt};
 use crate::kernel::{Kernel, Outcome, StepContext, accepts, inner_step};
 use crate::state::{StateError, holds, pack, unpack};
 use pcadlang_engine::trace::{Constraint, Trace, TraceResult};
+
+pub(crate) const ROW: KernelRow = KernelRow::new(
+    "temper",
+    &[
+        INNER,
+        opt("levels", Type::Int, "6", "The number of temperatures."),
+        opt(
+            "hottest",
+            Type::Num,
+            "0.01",
+            "The lowest power of the likelihood; warm-up adapts the ladder of temperatures.",
+        ),
+    ],
+    "Replica exchange (parallel tempering) over powers of the likelihood: each step updates \
+     every replica, then proposes swaps of neighbours (Geyer 1991).",
+    number!(
+        "\
+infer {
+  warmup 200 { temper(drift(@x), levels = 3); }
+  repeat 100 { temper(drift(@x), levels = 3); collect x; }
+}"
+    ),
+    |call| {
+        let levels = call.whole(1, 6, 2, 1000)?;
+        let hottest = call.positive(2)?.unwrap_or(0.01);
+        let inner = (0..levels).map(|_| call.inner()).collect::<Result<Vec<_>, _>>()?;
+        let signature = format!("temper({}, {levels}, {hottest})", inner[0].signature);
+        let inner = inner.into_iter().map(|b| b.kernel).collect();
+        Ok(Built::new(Temper::new(inner, hottest.min(1.0)), signature))
+    },
+)
+.irreversible();
 
 /// The target swap rate: the optimum for many temperatures (Kone & Kofke 2005).
 const AIM: f64 = 0.234;

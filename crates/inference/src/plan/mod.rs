@@ -1,7 +1,6 @@
 //! Running a compiled inference block on a chain, step by step.
 
 mod apply;
-pub(super) mod banks;
 pub(super) mod checkpoint;
 mod place;
 mod resume;
@@ -13,8 +12,10 @@ use super::draws::Sink;
 use super::init::{Start, starts_from};
 use super::population::Population;
 use super::run::{ChainError, ChainResult, Progress, RunOptions};
+use crate::calls::build::KernelMaker;
 use pcadlang_engine::lang::code::Code;
-use pcadlang_engine::lang::plan::Plan;
+use pcadlang_engine::lang::error::RunError;
+use pcadlang_engine::lang::plan::{Callee, Plan, Step};
 use pcadlang_engine::trace::{Limits, Trace};
 use pcadlang_numerics::platform::clock::Instant;
 use runner::Runner;
@@ -41,13 +42,13 @@ pub(crate) fn run_chain(
     let started = Instant::now();
     let options = &stoppable(options, progress);
     if let Some(checkpoint) = sink.resume().map_err(ChainError::Sink)? {
-        banks::check(code, &plan.steps, options)?;
+        check(code, &plan.steps, options)?;
         return Runner::resume(code, plan, options, progress, sink, chain, checkpoint)?.run();
     }
     let (how, from) = shared.get(|| start_of(code, plan, options))?;
     // Under a time limit a quarter of it is for the start, as much as that leaves to warm-up.
     let how = Start { within: options.time.map(|t| t / 4), ..how };
-    banks::check(code, &plan.steps, options)?;
+    check(code, &plan.steps, options)?;
     let mut begun =
         starts_from(code, (options.seed, chain), how, from.as_ref(), options.limits.clone())
             .map_err(ChainError::Start)?;
@@ -74,10 +75,25 @@ pub fn run_from(
 ) -> Result<ChainResult, ChainError> {
     let started = Instant::now();
     let options = &stoppable(options, progress);
-    banks::check(code, &plan.steps, options)?;
+    check(code, &plan.steps, options)?;
     trace.rollback();
     trace.set_limits(options.limits.clone());
     run_among(code, plan, options, progress, sink, (chain, started), vec![trace])
+}
+
+/// Checks the calls of kernels, as far as these can before a chain begins.
+fn check(code: &Code, steps: &[Step], options: &RunOptions) -> Result<(), Box<RunError>> {
+    for step in steps {
+        for call in step.calls() {
+            if let Callee::Builtin(i) = call.kernel
+                && let Some(check) = KernelMaker::of(code.builtins.get(i)).and_then(|m| m.check)
+            {
+                check(call, options)?;
+            }
+        }
+        check(code, step.body(), options)?;
+    }
+    Ok(())
 }
 
 /// The options of a chain, with limits by which it can also be stopped in the middle of

@@ -174,7 +174,8 @@ families! { $
     }
     doc "The Bernoulli distribution: true or false."
     on "false, true"
-    density "p if x else 1 - p";
+    density "p if x else 1 - p"
+    drawn Unknown;
 
     uniform_discrete: inline numbers UniformDiscrete {
         lo: integer, "The minimum.";
@@ -211,7 +212,8 @@ families! { $
     }
     doc "The Dirichlet distribution: proportions that sum to 1."
     on "arrays of proportions x[i] >= 0 with sum 1"
-    density "Gamma(sum(alpha)) product(x[i]^(alpha[i] - 1) / Gamma(alpha[i]))";
+    density "Gamma(sum(alpha)) product(x[i]^(alpha[i] - 1) / Gamma(alpha[i]))"
+    drawn Array;
 
     multinomial: shared other Multinomial {
         n: Integer, "The number of draws.";
@@ -219,7 +221,8 @@ families! { $
     }
     doc "The multinomial distribution: the counts of each category among n draws."
     on "arrays of len(weights) counts with sum n"
-    density "n! product((weights[i] / sum(weights))^x[i] / x[i]!)";
+    density "n! product((weights[i] / sum(weights))^x[i] / x[i]!)"
+    drawn Array;
 
     lkj: shared other Lkj {
         n: Integer, "The number of rows, from 1 to 1000.";
@@ -231,7 +234,8 @@ families! { $
     on "lower triangular arrays of n rows L, each of norm 1, with a non-negative diagonal"
     density "proportional to det(L L')^(eta - 1) with respect to the correlations: \
              product(L[i][i]^(n - 1 - i + 2 (eta - 1))) with respect to the numbers below the \
-             diagonal";
+             diagonal"
+    drawn Array;
 
     wishart: shared other Wishart {
         df: Number, "The degrees of freedom, above the number of rows minus 1.";
@@ -242,7 +246,8 @@ families! { $
          which `mv_normal` takes as `chol`; the mean of W is df scale_chol scale_chol'."
     on "lower triangular arrays of rows L with a positive diagonal, W = L L'"
     density "L = scale_chol A: A[i][i]^2 is chi-squared with df - i degrees of freedom, A[i][j] \
-             normal(0, 1) below the diagonal";
+             normal(0, 1) below the diagonal"
+    drawn Array;
 
     mv_normal: shared other MvNormal {
         mean: Array, "The mean vector.";
@@ -254,7 +259,8 @@ families! { $
     }
     doc "The multivariate normal distribution."
     on "arrays as long as the mean"
-    density "exp(-(x - mean)' cov^-1 (x - mean) / 2) / sqrt(det(2 pi cov))";
+    density "exp(-(x - mean)' cov^-1 (x - mean) / 2) / sqrt(det(2 pi cov))"
+    drawn Correlated;
 
     gp: shared other Gp {
         mean: Numbers, "The mean: one number, or one per point.";
@@ -268,7 +274,8 @@ families! { $
     doc "A Gaussian process at given points: the values of a random function there."
     on "arrays as long as `at`"
     density "mv_normal(mean, K) with K[i][j] = cov(at[i], at[j]), plus jitter times the variance \
-             on the diagonal";
+             on the diagonal"
+    drawn Correlated;
 
     iid: shared other Iid {
         d: Distribution, "A distribution.";
@@ -276,7 +283,8 @@ families! { $
     }
     doc "Independent, identically distributed values."
     on "arrays of n values of d"
-    density "the product of the densities of d";
+    density "the product of the densities of d"
+    drawn Unknown;
 
     ordered: shared other Ordered {
         d: Any, "A distribution of continuous numbers, or an array of them.";
@@ -289,7 +297,8 @@ families! { $
     on "ascending arrays of n values of d"
     density "n! times the product of the densities of d; for an array, the product of their \
              densities, not divided by the probability of that order (which is constant only if \
-             their parameters are)";
+             their parameters are)"
+    drawn Array;
 
     mixture: shared other Mixture {
         weights: Array, "One weight per component; they need not sum to 1.";
@@ -297,5 +306,6 @@ families! { $
     }
     doc "A mixture: a value from one of several distributions, with the component summed out."
     on "that of the components, or the smallest interval containing theirs"
-    density "sum(weights[k] / sum(weights) density of components[k])";
+    density "sum(weights[k] / sum(weights) density of components[k])"
+    drawn Unknown;
 }

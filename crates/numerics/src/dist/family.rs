@@ -33,6 +33,19 @@ pub struct ParamDoc {
     pub unit: &'static str,
 }
 
+/// What a draw from a family is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Drawn {
+    /// A number, or an array if a parameter is one.
+    Elementwise,
+    /// An array.
+    Array,
+    /// An array, by a matrix whose factor is worth keeping.
+    Correlated,
+    /// Not known from the parameters.
+    Unknown,
+}
+
 /// A family of distributions.
 #[derive(Clone, Copy, Debug)]
 pub struct Family {
@@ -46,6 +59,8 @@ pub struct Family {
     pub support: &'static str,
     /// The density or probability.
     pub formula: &'static str,
+    /// What a draw is.
+    pub drawn: Drawn,
     /// What numbers as parameters give, if all parameters are numbers.
     pub numbers: Option<Numbers>,
 }
@@ -102,7 +117,8 @@ pub trait Named {
 /// - `numbers` if all of its parameters are numbers, otherwise `other`;
 /// - the parameters: for `numbers`, each with the check of `param.rs` that it passes
 ///   before `of` makes the distribution; for `other`, each with its [`ParamKind`];
-/// - what users read about it.
+/// - what users read about it;
+/// - what is `drawn`, if not [`Drawn::Elementwise`].
 ///
 /// Inline families of numbers are also scored in batches. The macro is given a `$` for
 /// the macro `each` that it defines.
@@ -116,7 +132,8 @@ macro_rules! families {
             }
             doc $doc:literal
             on $support:literal
-            density $formula:literal;
+            density $formula:literal
+            $(drawn $drawn:ident)?;
         )*
     ) => {
         /// A distribution of any family, at most 48 bytes: most scalar families are
@@ -156,6 +173,7 @@ macro_rules! families {
                 }),*],
                 support: $support,
                 formula: $formula,
+                drawn: family!(drawn $($drawn)?),
                 numbers: family!(numbers $params $Family $($p)*),
             },)*
         ];
@@ -192,6 +210,8 @@ macro_rules! family {
     (type shared $Family:ident) => { Arc<$Family> };
     (kind numbers $check:ident) => { ParamKind::Numbers };
     (kind other $kind:ident) => { ParamKind::$kind };
+    (drawn) => { Drawn::Elementwise };
+    (drawn $drawn:ident) => { Drawn::$drawn };
     (option) => { None };
     (option $default:literal) => { Some($default) };
     (count $($p:ident)*) => { [$(stringify!($p)),*].len() };

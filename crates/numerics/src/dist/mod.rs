@@ -29,7 +29,7 @@ pub use datum::Datum;
 pub use discrete::*;
 pub use distribution::{Distribution, Gradient};
 pub use families::{Dist, FAMILIES};
-pub use family::{Family, Named, Numbers, ParamDoc, ParamKind};
+pub use family::{Drawn, Family, Named, Numbers, ParamDoc, ParamKind};
 pub use joint::*;
 pub use normals::batch;
 pub use param::ParamError;

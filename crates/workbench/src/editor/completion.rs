@@ -106,7 +106,7 @@ impl Analysis {
         let functions = self.builtins.iter().filter(move |b| named(&b.name)).map(|b| Candidate {
             word: b.full_name(),
             kind: match b.kind {
-                Kind::Inference(_) => CandidateKind::Kernel,
+                Kind::Plan(_) => CandidateKind::Kernel,
                 _ => CandidateKind::Function,
             },
             detail: b.doc.to_string(),

@@ -59,7 +59,7 @@ impl Analysis {
         let other = self.names.other_at(0, byte + 1).map(|(_, name)| name);
         let found = other.and_then(|name| self.builtins.iter().find(|b| b.full_name() == name));
         match found.map(|b| b.kind) {
-            Some(Kind::Inference(_)) => PieceKind::Kernel,
+            Some(Kind::Plan(_)) => PieceKind::Kernel,
             Some(_) => PieceKind::Function,
             None => PieceKind::Text(Class::Name),
         }

@@ -48,12 +48,8 @@ impl Session {
             "set" if is_first => self.complete_choice(before, params()),
             "flip" | "trace" => self.complete_choice(before, self.selections()),
             "infer" if !before.contains(['(', '{']) => {
-                let kernels = self
-                    .model
-                    .code()
-                    .builtins
-                    .iter()
-                    .filter(|b| matches!(b.kind, Kind::Inference(_)));
+                let kernels =
+                    self.model.code().builtins.iter().filter(|b| matches!(b.kind, Kind::Plan(_)));
                 let own = self.model.kernels().iter().map(|k| k.name.node.to_string());
                 let plans = self.model.plan_names().map(str::to_owned).collect::<Vec<_>>();
                 found(start, word, kernels.map(|b| b.name.to_string()).chain(own).chain(plans))

@@ -4,7 +4,7 @@ use super::data::DataFormat;
 use crate::lang::adjoint::Adjoint;
 use crate::lang::fault::Fault;
 use crate::lang::value::Value;
-use pcadlang_numerics::dist::{Dist, Numbers};
+use pcadlang_numerics::dist::{Dist, Drawn, Numbers};
 use pcadlang_numerics::num::Column;
 use smallvec::SmallVec;
 use std::any::Any;
@@ -104,25 +104,9 @@ pub enum Form {
 /// What a name of inference blocks stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
-pub enum Inference {
-    Mh,
-    Block,
-    Drift,
-    Gibbs,
-    Elliptical,
-    Slice,
-    Hmc,
-    Nuts,
-    Mala,
-    Knn,
-    Delayed,
-    Temper,
-    Smc,
-    Abc,
-    Modes,
-    Optimize,
-    /// A kernel of a host.
-    Host,
+pub enum PlanForm {
+    /// A kernel: what makes it is with its entry ([`HostItem::Kernel`]).
+    Kernel(KernelTraits),
     One,
     Each,
     Init,
@@ -134,8 +118,15 @@ pub enum Inference {
     Steps,
     /// Belongs in reports.
     Reported,
-    /// This version checks and documents it but cannot run it.
-    Planned,
+}
+
+/// What static checks know of a kernel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct KernelTraits {
+    /// Whether a step is something else than a reversible move of one state.
+    pub irreversible: bool,
+    /// For a kernel that applies only reversible ones: a call of it, as an example.
+    pub of_reversible: Option<&'static str>,
 }
 
 /// The kind of a built-in.
@@ -148,7 +139,7 @@ pub enum Kind {
     /// A form.
     Form(Form),
     /// Known only to inference plans: kernels, starts, monitors.
-    Inference(Inference),
+    Plan(PlanForm),
 }
 
 /// The action of a built-in on single numbers, if that determines it completely. Compiled
@@ -284,7 +275,7 @@ pub enum HostItem {
     Family(Arc<Make>),
     /// A family of likelihoods.
     Likelihood(Arc<Function>),
-    /// A maker of kernels; only `infer` knows its type.
+    /// A maker of kernels; only the crate of kernels knows its type.
     Kernel(State),
 }
 
@@ -309,9 +300,12 @@ pub struct Builtin {
     pub kind: Kind,
     /// Its action on single numbers.
     pub scalar: Option<Scalar>,
+    /// What a draw is, of a family of distributions.
+    pub drawn: Drawn,
     /// Its derivative.
     pub derivative: Derivative,
-    /// The host's implementation; `None` for the language's own built-ins.
+    /// The closures behind it: of what a host brings, of a kernel, and of an incremental
+    /// function.
     pub host: Option<HostItem>,
     /// How files are read, for a kind of data.
     pub format: Option<Arc<dyn DataFormat>>,

@@ -5,7 +5,7 @@
 //! closure through the built-in in their [`Args`]. Callers need not know about hosts.
 
 use super::builtin::{
-    ArgAdjoints, Args, Builtin, Derivative, HostItem, Incremental, Inference, Kind,
+    ArgAdjoints, Args, Builtin, Derivative, HostItem, Incremental, KernelTraits, Kind, PlanForm,
     PreviousEvaluation,
 };
 use crate::lang::adjoint::Adjoint;
@@ -26,7 +26,9 @@ impl HostItem {
             HostItem::Incremental { vjp, .. } => (Kind::Function(call_host), product(vjp)),
             HostItem::Family(_) => (Kind::Distribution(make_host_dist), Derivative::Unknown),
             HostItem::Likelihood(_) => (Kind::Function(call_host), Derivative::Product(vjp_host)),
-            HostItem::Kernel(_) => (Kind::Inference(Inference::Host), Derivative::Unknown),
+            HostItem::Kernel(_) => {
+                (Kind::Plan(PlanForm::Kernel(KernelTraits::default())), Derivative::Unknown)
+            }
         }
     }
 }
@@ -41,7 +43,7 @@ impl Builtin {
         match self.kind {
             Kind::Function(f) => f(&args),
             Kind::Distribution(_) => self.distribution(values).map(|d| Value::Dist(Arc::new(d))),
-            Kind::Form(_) | Kind::Inference(_) => Err(Fault::type_error(format!(
+            Kind::Form(_) | Kind::Plan(_) => Err(Fault::type_error(format!(
                 "`{}` cannot be used as a function value",
                 self.name
             ))),

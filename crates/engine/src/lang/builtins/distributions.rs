@@ -30,6 +30,7 @@ fn builtin(f: &Family) -> Builtin {
     Builtin {
         args: f.params.iter().map(argument).collect(),
         scalar: scalar(f),
+        drawn: f.drawn,
         ..Builtin::from(&Row::new(kind, f.name, "Distributions", &[], Type::Dist, f.doc))
     }
 }

@@ -1,5 +1,5 @@
-//! The table of built-ins: every function, distribution, form and kernel with its
-//! arguments, units and doc line.
+//! The table of built-ins: every function, distribution, form and name of plans with its
+//! arguments, units and doc line. Kernels are added above.
 //!
 //! Evaluation, static checks, `pcadlang doc` and the language reference all read this
 //! table. The functions are pure: equal arguments give bit-identical results on every
@@ -16,7 +16,6 @@ mod elementwise;
 pub mod examples;
 mod finding;
 mod forms;
-mod inference;
 mod interp;
 mod language;
 mod linear;
@@ -24,13 +23,14 @@ mod list;
 mod log_density;
 mod math;
 mod operators;
+mod plans;
 mod reduce;
 mod row;
 mod table;
 
 pub use builtin::{
-    ArgAdjoints, Args, Argument, Binary, Builtin, Derivative, Form, HostItem, Inference, Kind,
-    PreviousEvaluation, Reduction, Scalar, State, Text, Type, Vjp,
+    ArgAdjoints, Args, Argument, Binary, Builtin, Derivative, Form, HostItem, KernelTraits, Kind,
+    PlanForm, PreviousEvaluation, Reduction, Scalar, State, Text, Type, Vjp,
 };
 pub use covariance::CovarianceValue;
 pub(crate) use derivative::times;

@@ -9,6 +9,7 @@ use super::call::call_host;
 use super::data::DataFormat;
 use crate::lang::fault::Fault;
 use crate::lang::value::Value;
+use pcadlang_numerics::dist::Drawn;
 use std::sync::Arc;
 
 /// One argument; see [`Argument`].
@@ -175,6 +176,7 @@ impl From<&Row> for Builtin {
             doc: r.doc.into(),
             kind: r.kind,
             scalar: r.scalar,
+            drawn: Drawn::Unknown,
             derivative: r.derivative,
             host: r
                 .incremental

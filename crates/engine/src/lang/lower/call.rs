@@ -35,7 +35,7 @@ impl Lowerer<'_> {
                             None => self.nothing(),
                         }
                     }
-                    Kind::Inference(what) => self.given(what, b, args, e, callee.span),
+                    Kind::Plan(what) => self.given(what, b, args, e, callee.span),
                 }
             }
             Target::Function(block) => {

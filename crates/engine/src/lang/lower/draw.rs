@@ -5,6 +5,7 @@ use super::scope::{Meaning, ScopeKind};
 use crate::lang::builtins::Type;
 use crate::lang::code::{DistSpec, Op, Operand, Slot, Source, SourceKey};
 use crate::lang::value::Value;
+use pcadlang_numerics::dist::Drawn;
 use pcadlang_syntax::ast::{Expr, ExprKind, Name, Stmt, StmtKind, Tag};
 use pcadlang_syntax::print_expr;
 use pcadlang_syntax::span::Span;
@@ -24,17 +25,11 @@ impl Lowerer<'_> {
     /// Returns the static type of a draw of a family, as far as it is known.
     fn drawn_type(&self, d: &DistSpec) -> Type {
         match d {
-            // Only the host knows the type of its family's draws.
-            DistSpec::Family { builtin, .. } if self.code.builtins.get(*builtin).host.is_some() => {
-                Type::Any
-            }
-            DistSpec::Family { builtin, args } => match &*self.code.builtins.get(*builtin).name {
-                "flip" => Type::Any,
-                "dirichlet" | "multinomial" | "lkj" | "wishart" | "ordered" => Type::Array,
-                "iid" | "mixture" => Type::Any,
-                _ if args.iter().all(|a| self.is_number(*a)) => Type::Num,
-                // A parameter that is an array makes the choice an array.
-                _ => Type::Nums,
+            DistSpec::Family { builtin, args } => match self.code.builtins.get(*builtin).drawn {
+                Drawn::Elementwise if args.iter().all(|a| self.is_number(*a)) => Type::Num,
+                Drawn::Elementwise => Type::Nums,
+                Drawn::Array | Drawn::Correlated => Type::Array,
+                Drawn::Unknown => Type::Any,
             },
             DistSpec::Value(o) if self.makes_arrays(*o) => Type::Array,
             DistSpec::Value(_) => Type::Any,
@@ -52,8 +47,7 @@ impl Lowerer<'_> {
 
     /// Whether a built-in is a family with a covariance matrix.
     pub fn has_covariance(&self, builtin: u32) -> bool {
-        let family = self.code.builtins.get(builtin);
-        family.host.is_none() && matches!(&*family.name, "mv_normal" | "gp")
+        self.code.builtins.get(builtin).drawn == Drawn::Correlated
     }
 
     fn is_number(&self, o: Operand) -> bool {

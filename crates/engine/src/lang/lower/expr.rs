@@ -122,7 +122,7 @@ impl Lowerer<'_> {
                     self.error(format!("`{name}` can only be called"), span, "not a value")
                         .hint_also(format!("wrap it in a function: fn(x) {{ {name}(…) }}"));
                 }
-                Kind::Inference(_) => self.only_in_plans(name, span),
+                Kind::Plan(_) => self.only_in_plans(name, span),
             }
             return self.nothing();
         }

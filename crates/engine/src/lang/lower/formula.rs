@@ -3,7 +3,7 @@
 
 use super::lowerer::{AddHint, Around, Lowerer, Lowering, Typed};
 use super::scope::{Binding, Body, Meaning, Scope, ScopeKind};
-use crate::lang::builtins::{Builtin, Inference, Type};
+use crate::lang::builtins::{Builtin, PlanForm, Type};
 use crate::lang::code::{Block, BlockId, BlockKind, Op, Operand, Slot};
 use crate::lang::plan::{Argument, Formula, FormulaKind, Given, Path, PathSegment, Selection};
 use pcadlang_syntax::ast::{Arg, Expr};
@@ -155,7 +155,7 @@ impl Lowerer<'_> {
     /// value.
     pub fn given(
         &mut self,
-        what: Inference,
+        what: PlanForm,
         b: &Builtin,
         args: &[Arg],
         e: &Expr,
@@ -170,9 +170,9 @@ impl Lowerer<'_> {
             return self.nothing();
         };
         let given = match (what, args.first()) {
-            (Inference::Steps, _) => Given::Steps,
-            (Inference::Elapsed, _) => Given::Elapsed,
-            (Inference::Value, Some(Argument::Choices(choices))) => match &choices.selection {
+            (PlanForm::Steps, _) => Given::Steps,
+            (PlanForm::Elapsed, _) => Given::Elapsed,
+            (PlanForm::Value, Some(Argument::Choices(choices))) => match &choices.selection {
                 Selection::Path(path) => Given::Choice(path.clone()),
                 // Refused like any other address of several choices.
                 _ => {

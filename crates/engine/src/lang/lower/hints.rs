@@ -49,7 +49,7 @@ impl Lowerer<'_> {
         let known = builtins
             .iter()
             .filter(|b| b.module.is_empty() && b.name.starts_with(|c: char| c.is_alphabetic()))
-            .filter(|b| !matches!(b.kind, Kind::Inference(_)))
+            .filter(|b| !matches!(b.kind, Kind::Plan(_)))
             .map(|b| &*b.name);
         let near = nearest(name, visible.iter().map(|n| &**n).chain(known)).map(str::to_owned);
         // A name of a namespace, written without the namespace.

@@ -3,7 +3,7 @@
 
 use super::lowerer::{AddHint, Around, Lowerer};
 use super::types::shown;
-use crate::lang::builtins::{self, Builtin, Inference, Kind, Type};
+use crate::lang::builtins::{self, Builtin, KernelTraits, Kind, PlanForm, Type};
 use crate::lang::code::Operand;
 use crate::lang::plan::{
     Argument, BestOf, Callee, Choices, DeclaredKernel, Formula, KernelCall, Path, PathSegment,
@@ -216,7 +216,7 @@ impl Lowerer<'_> {
             );
             return None;
         }
-        if what == Inference::Init && around.in_loop {
+        if what == PlanForm::Init && around.in_loop {
             self.error(
                 "`init` is allowed only at the top level of an inference block",
                 e.span,
@@ -224,17 +224,17 @@ impl Lowerer<'_> {
             )
             .hint_also("infer { init(best_of(100)); repeat 1000 { … } }");
         }
-        if what == Inference::Anneal && !around.in_warmup {
+        if what == PlanForm::Anneal && !around.in_warmup {
             self.error("`anneal` is allowed only in `warmup`", e.span, "draws are kept here")
                 .hint_also("draws must be collected under the unmodified likelihood");
         }
-        if what == Inference::Init {
+        if what == PlanForm::Init {
             let start = self.matched(b, args, e.span)?.first().copied().flatten()?;
             return self.start(&args[start].value, around);
         }
         let args = self.inference_args(b, args, e.span, around)?;
         match (what, args) {
-            (Inference::Anneal, args) => match args.into_iter().next()? {
+            (PlanForm::Anneal, args) => match args.into_iter().next()? {
                 Argument::Value(from) => Some(StepKind::Anneal(from)),
                 _ => None,
             },
@@ -287,10 +287,10 @@ impl Lowerer<'_> {
     }
 
     /// The built-in of inference blocks with this name, by its index in the table.
-    fn inference_name(&self, name: &str) -> Option<(u32, Inference)> {
+    fn inference_name(&self, name: &str) -> Option<(u32, PlanForm)> {
         let i = self.code.builtins.find("", name)?;
         match self.code.builtins.get(i).kind {
-            Kind::Inference(what) => Some((i, what)),
+            Kind::Plan(what) => Some((i, what)),
             _ => None,
         }
     }
@@ -304,10 +304,11 @@ impl Lowerer<'_> {
             None => self.modules[0].names.contains_key(name).then_some("a name of the model"),
         };
         let is_kernel = |b: &&Builtin| {
-            matches!(b.kind, Kind::Inference(what) if what != Inference::Prior)
+            matches!(b.kind, Kind::Plan(what) if what != PlanForm::Prior)
                 && b.returns == Type::Kernel
         };
         let known = table.iter().filter(is_kernel).map(|b| &*b.name);
+        let some: Vec<&str> = table.iter().filter(is_kernel).map(|b| &*b.name).take(5).collect();
         let own: Vec<Arc<str>> = self.kernels.keys().cloned().collect();
         let near = pcadlang_syntax::diag::nearest(name, known.chain(own.iter().map(|n| &**n)));
         let message = match other {
@@ -316,7 +317,7 @@ impl Lowerer<'_> {
         };
         let hint = match near {
             Some(n) => format!("did you mean `{n}`?"),
-            None => "kernels are mh, block, drift, gibbs, elliptical; see `pcadlang doc`".into(),
+            None => format!("kernels are {}; see `pcadlang doc`", some.join(", ")),
         };
         self.error(message, span, "not a kernel").hint_also(hint);
     }
@@ -375,16 +376,21 @@ impl Lowerer<'_> {
 
     /// Compiles the argument of a kernel that applies another one.
     fn inner_kernel(&mut self, outer: &Builtin, e: &Expr, around: &Around) -> Argument {
-        if matches!(outer.kind, Kind::Inference(Inference::Delayed))
-            && let Some((inner, _)) = call(e)
-            && ["temper", "smc", "abc", "optimize"].contains(&inner)
+        let traits = |what| match what {
+            Kind::Plan(PlanForm::Kernel(traits)) => traits,
+            _ => KernelTraits::default(),
+        };
+        if let Some(example) = traits(outer.kind).of_reversible
+            && let Some((name, _)) = call(e).filter(|(name, _)| !self.kernels.contains_key(*name))
+            && let Some((i, _)) = self.inference_name(name)
+            && traits(self.code.builtins.get(i).kind).irreversible
         {
             self.error(
-                format!("`delayed` does not take `{inner}`"),
+                format!("`{}` does not take `{name}`", outer.name),
                 e.span,
                 "not a reversible move of one state",
             )
-            .hint_also("for example delayed(drift(@x), @obs)");
+            .hint_also(format!("for example {example}"));
         }
         match self.kernel(e, around) {
             Some(StepKind::Apply(call)) => Argument::Kernel(call),
@@ -397,10 +403,10 @@ impl Lowerer<'_> {
         let table = Arc::clone(&self.code.builtins);
         let found = call(e).and_then(|(name, args)| Some((self.inference_name(name)?, args)));
         match found {
-            Some(((i, Inference::Prior), args)) => self
+            Some(((i, PlanForm::Prior), args)) => self
                 .inference_args(table.get(i), args, e.span, around)
                 .map(|_| StepKind::Init(None)),
-            Some(((i, Inference::BestOf), args)) => {
+            Some(((i, PlanForm::BestOf), args)) => {
                 let args = self.inference_args(table.get(i), args, e.span, around)?;
                 let mut args = args.into_iter();
                 let mut value = || match args.next() {

@@ -8,19 +8,19 @@
 //! choices appear or vanish, or the density is 0 has infinite energy.
 
 mod adapt;
-mod hmc;
+pub(super) mod hmc;
 mod kernel;
 mod laplace;
+pub(super) mod mala;
 mod memory;
-mod modes;
-mod nuts;
-mod optimize;
+pub(super) mod modes;
+pub(super) mod nuts;
+pub(super) mod optimize;
 mod point;
 mod summed;
 mod system;
 
 pub use hmc::Hmc;
 pub use kernel::Hamiltonian;
-pub use modes::Modes;
 pub use nuts::Nuts;
 pub use optimize::Optimize;

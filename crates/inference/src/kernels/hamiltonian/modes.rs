@@ -14,11 +14,63 @@ use super::system::System;
 use crate::kernel::{
     Kernel, Outcome, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
 };
+use crate::kernels::row::{KernelRow, SEL, Type, number, opt};
 use crate::state::{StateError, pack, unpack};
 use pcadlang_engine::trace::{Change, Constraint, Selector, Target, Trace, TraceResult};
 use pcadlang_numerics::dist::Datum;
 use pcadlang_numerics::rng::Stream;
 use serde::{Deserialize, Serialize};
+
+pub(crate) const ROW: KernelRow = KernelRow::new(
+    "modes",
+    &[
+        SEL,
+        opt(
+            "tries",
+            Type::Int,
+            "200",
+            "The number of draws from the prior, from which starting points are chosen.",
+        ),
+        opt(
+            "keep",
+            Type::Int,
+            "16",
+            "The number of these, the most probable, that climb to a mode.",
+        ),
+        opt("steps", Type::Int, "60", "The maximum number of optimisation steps per climb."),
+        opt(
+            "first",
+            Type::Selection,
+            "none",
+            "Choices that are optimised alone for some steps in each draw, before draws are \
+             compared.",
+        ),
+        opt(
+            "at",
+            Type::Selection,
+            "none",
+            "Observations that are replaced by their coarse surrogates during the search for \
+             modes.",
+        ),
+    ],
+    "Jumps between modes. The first step searches for them: the most probable draws of the \
+     selected choices climb by L-BFGS, in rounds that each keep the better half; in warm-up \
+     the state then moves to one of the modes, drawn by the Laplace estimates of their \
+     evidence, and with `at` it climbs further under the observations themselves (choices \
+     that no surrogate depends on are left out). After that, all selected choices are \
+     proposed jointly from a mixture of Laplace approximations at the modes (independent \
+     Metropolis-Hastings, Tierney 1994).",
+    number!("infer { warmup 20 { modes(@x); } repeat 100 { modes(@x); collect x; } }"),
+    |call| {
+        call.moving(|scope, call| {
+            let tries = call.whole(1, 200, 1, 1_000_000)?;
+            let keep = call.whole(2, 16, 1, 1000)?;
+            let steps = call.whole(3, 60, 1, 1_000_000)?;
+            let modes = Modes::new(scope, tries, keep, steps).climbing_first(call.scope(4)?);
+            Ok(modes.by_surrogates_of(call.selector(5)?))
+        })
+    },
+);
 
 /// The step of the finite differences for curvatures.
 const STEP: f64 = 1e-4;

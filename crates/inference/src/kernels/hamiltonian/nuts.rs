@@ -6,10 +6,33 @@ use super::kernel::{DIVERGENT, End, Hamiltonian, Path, Trajectory};
 use super::point::Point;
 use super::system::System;
 use crate::kernel::SiteSelection;
+use crate::kernels::row::{KernelRow, MARGINAL, SEL, Type, number, opt};
 use pcadlang_engine::trace::TraceResult;
 use pcadlang_numerics::num::log_sum_exp;
 use pcadlang_numerics::rng::Stream;
 use std::sync::Arc;
+
+pub(crate) const ROW: KernelRow = KernelRow::new(
+    "nuts",
+    &[
+        SEL,
+        opt(
+            "max_depth",
+            Type::Int,
+            "10",
+            "The maximum tree depth: at most 2^max_depth leapfrog steps.",
+        ),
+        MARGINAL,
+    ],
+    "The No-U-Turn sampler (Hoffman and Gelman 2014).",
+    number!("infer { warmup 200 { nuts(@x); } repeat 100 { nuts(@x); collect x; } }"),
+    |call| {
+        call.moving(|scope, call| {
+            let depth = call.whole(1, 10, 1, 20)?;
+            Ok(Nuts::new(scope, depth).summing_out(call.marginal(2)?))
+        })
+    },
+);
 
 /// The No-U-Turn sampler.
 pub type Nuts = Hamiltonian<Doubling>;

@@ -4,7 +4,7 @@
 //! that use `scene` omit the line [`INCLUDE`], which precedes them.
 
 mod distributions;
-mod inference;
+mod plans;
 mod values;
 
 use super::Text;
@@ -17,7 +17,7 @@ pub(crate) type Examples = &'static [(&'static str, &'static str)];
 
 /// The example of one of the language's built-ins.
 pub(super) fn of(name: &str) -> Option<Text> {
-    [values::EXAMPLES, distributions::EXAMPLES, inference::EXAMPLES]
+    [values::EXAMPLES, distributions::EXAMPLES, plans::EXAMPLES]
         .into_iter()
         .flatten()
         .find(|(of, _)| *of == name)

@@ -128,17 +128,10 @@ fn traits(a: &Argument) -> String {
     s
 }
 
-/// Further notes: availability, support and density.
+/// Further notes: support and density.
 fn notes(b: &Builtin) -> Vec<(&'static str, String)> {
-    let mut notes = Vec::new();
-    if b.is_planned() {
-        notes.push((
-            "Not available yet",
-            "checked, but a run that reaches it ends with an error.".to_owned(),
-        ));
+    match b.kind {
+        Kind::Distribution(_) => crate::lang::builtins::distributions::notes(&b.name),
+        _ => Vec::new(),
     }
-    if matches!(b.kind, Kind::Distribution(_)) {
-        notes.extend(crate::lang::builtins::distributions::notes(&b.name));
-    }
-    notes
 }
