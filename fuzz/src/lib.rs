@@ -70,7 +70,7 @@ pub fn program(bytes: &[u8]) {
 }
 
 fn run(model: &Model) {
-    let time = Some(Duration::from_millis(500));
+    let time = Some(Duration::from_millis(100));
     let options = RunOptions {
         steps: Some(20),
         warmup: Some(10),

@@ -292,10 +292,13 @@ mod tests {
                 let worst = far.fold(0.0, f64::max);
                 // Rows of samples are a quarter of a pixel high.
                 prop_assert!(worst <= 0.13, "{worst}");
+                // Over the outline the differences cancel, but for a hundredth of a pixel or two.
+                let partial = own.iter().filter(|f| **f > 0.0 && **f < 1.0).count() as f64;
                 let sum = |all: &mut dyn Iterator<Item = f64>| all.sum::<f64>();
                 let (own, finer) =
                     (sum(&mut own.iter().map(|f| f64::from(*f))), sum(&mut finer.iter().copied()));
-                prop_assert!((own - finer).abs() < 1.0, "{own} {finer}");
+                if (own - finer).abs() > 0.5 { eprintln!("PARTIAL {partial} {own} {finer}"); }
+                prop_assert!((own - finer).abs() < 0.5 + 0.02 * partial, "{own} {finer} {partial}");
             }
         }
     }
