@@ -1,5 +1,8 @@
 //! The command line.
 
+// Comments of arguments are the help that the command prints, not Markdown.
+#![allow(rustdoc::broken_intra_doc_links, rustdoc::invalid_html_tags, rustdoc::bare_urls)]
+
 mod repl;
 
 pub use repl::{Graphics, Repl};

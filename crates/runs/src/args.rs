@@ -1,5 +1,8 @@
 //! Arguments of commands: what a run is given, and what is asked of its folder.
 
+// Comments of arguments are the help that the command prints, not Markdown.
+#![allow(rustdoc::broken_intra_doc_links, rustdoc::invalid_html_tags, rustdoc::bare_urls)]
+
 mod live;
 mod reopening;
 mod values;

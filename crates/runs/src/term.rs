@@ -5,7 +5,7 @@ use pcadlang_syntax::diag::render;
 use std::io::IsTerminal;
 
 /// Returns whether errors may have colours: on a terminal that supports them, unless
-/// NO_COLOR is set (https://no-color.org).
+/// NO_COLOR is set (<https://no-color.org>).
 pub fn has_colors() -> bool {
     let set = |name| std::env::var_os(name).is_some_and(|v: std::ffi::OsString| !v.is_empty());
     let dumb = std::env::var_os("TERM").is_some_and(|v| v == "dumb");

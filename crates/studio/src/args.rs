@@ -1,5 +1,8 @@
 //! The arguments of `studio`.
 
+// Comments of arguments are the help that the command prints, not Markdown.
+#![allow(rustdoc::broken_intra_doc_links, rustdoc::invalid_html_tags, rustdoc::bare_urls)]
+
 use clap::Args;
 use pcadlang_runs::args::{Allowed, pair};
 use pcadlang_runs::files::program_name;
