@@ -22,8 +22,9 @@ pub use pcadlang_scene::render::Camera;
 pub use pcadlang_syntax::diag::Error;
 
 /// Error messages with the place of the mistake.
-#[doc = include_str!("guides/diag.md")]
 pub mod diag {
+    #![doc = include_str!("guides/diag.md")]
+
     pub use pcadlang_syntax::diag::{
         Diagnostic, IntoDiagnostic, Label, Severity, SourceFile, SourceMap, render,
     };
@@ -31,14 +32,16 @@ pub mod diag {
 }
 
 /// How a program that embeds the language registers what it brings.
-#[doc = include_str!("guides/host.md")]
 pub mod host {
+    #![doc = include_str!("guides/host.md")]
+
     pub use pcadlang_inference::host::*;
 }
 
 /// Kernels, chains and what runs report while they go on.
-#[doc = include_str!("guides/infer.md")]
 pub mod infer {
+    #![doc = include_str!("guides/infer.md")]
+
     pub use pcadlang_inference::{
         Block, Callback, Callbacks, ChainError, ChainResult, Checkpoint, Drift, Elliptical, Gibbs,
         Kernel, Mh, Outcome, Pick, Progress, SiteSelection, Slice, StateError, StepContext, decide,
@@ -52,8 +55,9 @@ pub mod infer {
 }
 
 /// What a run leaves: draws, quantities, folders.
-#[doc = include_str!("guides/report.md")]
 pub mod report {
+    #![doc = include_str!("guides/report.md")]
+
     pub use pcadlang_report::{ChainDraws, Memory, Quantity, RunDir, RunDirError, Tee, quantities};
 
     /// Draws as CmdStan writes them.
@@ -73,8 +77,9 @@ pub mod scene {
 }
 
 /// Executions of a program: choices by address, scores, updates, gradients.
-#[doc = include_str!("guides/trace.md")]
 pub mod trace {
+    #![doc = include_str!("guides/trace.md")]
+
     pub use pcadlang_engine::trace::{
         Address, AddressSegment, Change, ChoiceKind, Constraint, Draws, Given, Limits, Observation,
         Pattern, PatternSegment, Replicate, RunError, SaveError, SavedTrace, Selection, Selector,
