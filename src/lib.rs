@@ -21,8 +21,8 @@ pub use pcadlang_library::{Model, Posterior, Program};
 pub use pcadlang_scene::render::Camera;
 pub use pcadlang_syntax::diag::Error;
 
-/// Error messages with the place of the mistake.
 pub mod diag {
+    //! Error messages with the place of the mistake.
     #![doc = include_str!("guides/diag.md")]
 
     pub use pcadlang_syntax::diag::{
@@ -31,15 +31,15 @@ pub mod diag {
     pub use pcadlang_syntax::span::{FileId, Span};
 }
 
-/// How a program that embeds the language registers what it brings.
 pub mod host {
+    //! How a program that embeds the language registers what it brings.
     #![doc = include_str!("guides/host.md")]
 
     pub use pcadlang_inference::host::*;
 }
 
-/// Kernels, chains and what runs report while they go on.
 pub mod infer {
+    //! Kernels, chains and what runs report while they go on.
     #![doc = include_str!("guides/infer.md")]
 
     pub use pcadlang_inference::{
@@ -54,8 +54,8 @@ pub mod infer {
     }
 }
 
-/// What a run leaves: draws, quantities, folders.
 pub mod report {
+    //! What a run leaves: draws, quantities, folders.
     #![doc = include_str!("guides/report.md")]
 
     pub use pcadlang_report::{ChainDraws, Memory, Quantity, RunDir, RunDirError, Tee, quantities};
@@ -76,8 +76,8 @@ pub mod scene {
     pub use pcadlang_library::scene::SceneView;
 }
 
-/// Executions of a program: choices by address, scores, updates, gradients.
 pub mod trace {
+    //! Executions of a program: choices by address, scores, updates, gradients.
     #![doc = include_str!("guides/trace.md")]
 
     pub use pcadlang_engine::trace::{
