@@ -36,6 +36,7 @@ fn tradeoff(f: &Folder, more: &[&str]) -> Done {
 }
 
 #[test]
+#[ignore = "a quarter of a minute"]
 fn more_draws_are_nearer_to_the_reference() {
     let f = Folder::new("tradeoff_draws");
     mean_cases(&f);
