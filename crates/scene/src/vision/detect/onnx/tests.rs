@@ -285,7 +285,10 @@ fn networks_that_are_of_no_use() {
             }),
             "the output `same` is [1, 3, 64, 64], not a map of one channel",
         ),
-        (with(&|g| g.nodes[1] = node("Convert", &["side"], "fused", &[])), "cannot be read"),
+        (
+            with(&|g| g.nodes[1] = node("Convert", &["side"], "fused", &[])),
+            "cannot read the network",
+        ),
         // Weights of four channels for a picture of three.
         (
             with(&|g| g.tensors[0] = floats("weights", &[1, 4, 1, 1], &[1.0; 4])),
