@@ -78,7 +78,7 @@ impl Pixels {
     pub fn points(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let row = |j: usize| self.row(j).iter().enumerate().map(move |(k, word)| (j, k, *word));
         (0..self.height).flat_map(row).filter(|(_, _, word)| *word != 0).flat_map(|(j, k, word)| {
-            let rest = std::iter::successors(Some(word), |word| Some(word & (word - 1)));
+            let rest = std::iter::successors(Some(word), |word| Some(word & word.wrapping_sub(1)));
             rest.take_while(|word| *word != 0)
                 .map(move |word| (64 * k + word.trailing_zeros() as usize, j))
         })
