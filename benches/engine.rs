@@ -109,12 +109,12 @@ fn sweep(c: &mut Criterion) {
         let mut step = 0;
         c.bench_function(&format!("sweep: gibbs of each of {n} flags"), |b| {
             b.iter(|| {
-                let count = kernel.sweep(&mut trace).unwrap_or(1);
-                for member in 0..count {
+                let mut left = kernel.sweep(&mut trace, None).unwrap_or(1);
+                while left > 0 {
                     step += 1;
-                    let moved = kernel
-                        .step(&mut trace, &StepContext { member, ..StepContext::new(1, 0, step) });
+                    let moved = kernel.step(&mut trace, &StepContext::new(1, 0, step));
                     black_box(moved.map(|o| o.accepted).unwrap_or_default());
+                    left = kernel.remaining(&mut trace);
                 }
             });
         });

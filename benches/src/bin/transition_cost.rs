@@ -58,15 +58,15 @@ fn run(
     trace: &mut Trace,
     steps: std::ops::Range<u64>,
 ) -> Result<u64, Box<dyn Error>> {
-    let (mut moved, mut member, mut members) = (0, 0, 0);
+    let (mut moved, mut left) = (0, 0);
     for step in steps {
-        member += 1;
-        if member >= members {
-            (member, members) = (0, kernel.sweep(trace).unwrap_or(0));
+        if left == 0 {
+            left = kernel.sweep(trace, None).unwrap_or(1);
         }
-        let at = StepContext { member, ..StepContext::new(1, 0, step) };
+        let at = StepContext::new(1, 0, step);
         let outcome = kernel.step(trace, &at).map_err(|e| e.to_string())?;
         moved += u64::from(outcome.accepted);
+        left = kernel.remaining(trace);
     }
     Ok(moved)
 }

@@ -22,8 +22,6 @@ pub struct StepContext {
     pub adapting: bool,
     /// The power of the likelihood: 1 except in annealed warm-up.
     pub power: f64,
-    /// Which member of a sweep the step moves (see [`Kernel::sweep`]).
-    pub member: usize,
     /// Distinguishes steps within a step (see [`StepContext::within`]); 0 for the step
     /// itself.
     pub part: u64,
@@ -32,7 +30,7 @@ pub struct StepContext {
 impl StepContext {
     /// A step at the full likelihood, outside of warm-up.
     pub fn new(seed: u64, chain: u32, step: u64) -> Self {
-        StepContext { seed, chain, step, adapting: false, power: 1.0, member: 0, part: 0 }
+        StepContext { seed, chain, step, adapting: false, power: 1.0, part: 0 }
     }
 
     /// The randomness of values drawn inside the trace; `substream` distinguishes
@@ -45,7 +43,7 @@ impl StepContext {
 
     /// The context of part `i` of this step, with independent randomness.
     pub fn within(&self, i: u64) -> StepContext {
-        StepContext { part: mix(self.part, i + 1), member: 0, ..*self }
+        StepContext { part: mix(self.part, i + 1), ..*self }
     }
 
     /// The kernel's own randomness.
@@ -108,11 +106,27 @@ pub trait Kernel: Send {
     /// Its name in tables.
     fn name(&self) -> String;
 
-    /// Begins a sweep, if the kernel visits its choices in turn, and returns the number
-    /// of steps. [`StepContext::member`] says which of them a step is.
-    fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
-        let _ = trace;
+    /// The choices over which the kernel may sweep.
+    #[doc(hidden)]
+    fn scope(&mut self) -> Option<&mut Registered> {
         None
+    }
+
+    /// Begins a sweep, if the kernel visits its choices in turn, and returns the number
+    /// of steps in the present state. When a checkpoint resumes, the sweep continues after
+    /// the choice with this address hash.
+    fn sweep(&mut self, trace: &mut Trace, after: Option<u64>) -> Option<usize> {
+        self.scope()?.sweep(trace, after)
+    }
+
+    /// The number of steps of the sweep that remain in the present state.
+    fn remaining(&mut self, trace: &mut Trace) -> usize {
+        self.scope().map_or(0, |s| s.remaining(trace))
+    }
+
+    /// The address hash of the choice that the sweep has visited last.
+    fn visited(&mut self, trace: &Trace) -> Option<u64> {
+        self.scope()?.visited(trace)
     }
 
     /// The step size of the trajectories of Hamiltonian kernels.
@@ -158,10 +172,12 @@ pub(crate) fn inner_step(
     trace: &mut Trace,
     at: &StepContext,
 ) -> TraceResult<Outcome> {
-    let Some(members) = kernel.sweep(trace) else { return kernel.step(trace, at) };
-    let mut all = Outcome::default();
-    for member in 0..members {
-        all.add(kernel.step(trace, &StepContext { member, ..at.within(member as u64) })?);
+    let Some(mut left) = kernel.sweep(trace, None) else { return kernel.step(trace, at) };
+    let (mut all, mut steps) = (Outcome::default(), 0);
+    while left > 0 {
+        all.add(kernel.step(trace, &at.within(steps))?);
+        steps += 1;
+        left = kernel.remaining(trace);
     }
     Ok(all)
 }
@@ -185,32 +201,39 @@ impl SiteSelection {
 
 /// A site selection registered with a trace.
 #[derive(Clone, Debug)]
-pub(crate) struct Registered {
-    pub scope: SiteSelection,
+pub struct Registered {
+    pub(crate) scope: SiteSelection,
     /// The selection, and the trace it is registered with.
     selection: Option<(Arc<()>, Selection)>,
     sweep: Option<Sweep>,
 }
 
-/// The members of a sweep, as a set and in order.
+/// The members of a sweep, as a set and in program order, and how many were visited.
+///
+/// A step may create and remove members. The place of a choice in the program does not
+/// depend on its value, and the order of places is the same in all states. So a sweep
+/// applies one kernel for each possible place, in a fixed order; where the present state
+/// has no member the kernel does nothing. Each of them leaves the posterior invariant, and
+/// so does the sweep.
 #[derive(Clone, Debug)]
 struct Sweep {
     of: Arc<Vec<Target>>,
     order: Vec<Target>,
+    visited: usize,
 }
 
 impl Registered {
-    pub fn new(scope: SiteSelection) -> Self {
+    pub(crate) fn new(scope: SiteSelection) -> Self {
         Registered { scope, selection: None, sweep: None }
     }
 
     /// An empty selection.
-    pub fn nothing() -> Self {
+    pub(crate) fn nothing() -> Self {
         Registered::new(SiteSelection { selector: Selector::Nothing, pick: Pick::All })
     }
 
     /// The selection in this trace, registered on first use.
-    pub fn selection(&mut self, trace: &mut Trace) -> Selection {
+    pub(crate) fn selection(&mut self, trace: &mut Trace) -> Selection {
         match &self.selection {
             Some((of, s)) if Arc::ptr_eq(of, trace.identity()) => *s,
             _ => {
@@ -221,34 +244,60 @@ impl Registered {
         }
     }
 
-    /// The number of steps of a sweep over the members; `None` if the kernel does not
-    /// sweep.
-    pub fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
+    /// See [`Kernel::sweep`].
+    fn sweep(&mut self, trace: &mut Trace, after: Option<u64>) -> Option<usize> {
         if self.scope.pick != Pick::Each {
             return None;
         }
-        let selection = self.selection(trace);
-        let of = trace.listed(selection);
-        if !self.sweep.as_ref().is_some_and(|s| Arc::ptr_eq(&s.of, of)) {
-            let (of, order) = (Arc::clone(of), trace.in_program_order(selection));
-            self.sweep = Some(Sweep { of, order });
-        }
-        Some(self.sweep.as_ref().map_or(0, |s| s.order.len()))
+        self.sweep = None;
+        let sweep = self.sweep_in(trace);
+        let is_last = |t: &Target| Some(trace.address_hash(*t)) == after;
+        let last = after.and_then(|_| sweep.order.iter().position(is_last));
+        sweep.visited = last.map_or(0, |i| i + 1);
+        Some(sweep.order.len() - sweep.visited)
     }
 
-    /// One member: chosen uniformly, with the number of candidates, or the one that the
-    /// sweep has reached, with 1.
-    pub fn pick(
-        &mut self,
-        trace: &mut Trace,
-        at: &StepContext,
-        rng: &mut Stream,
-    ) -> Option<(Target, usize)> {
-        if self.scope.pick == Pick::Each {
-            if self.sweep.is_none() {
-                self.sweep(trace);
+    /// See [`Kernel::remaining`].
+    fn remaining(&mut self, trace: &mut Trace) -> usize {
+        if self.sweep.is_none() {
+            return 0;
+        }
+        let sweep = self.sweep_in(trace);
+        sweep.order.len() - sweep.visited
+    }
+
+    /// See [`Kernel::visited`].
+    fn visited(&self, trace: &Trace) -> Option<u64> {
+        self.sweep.as_ref()?.last().map(|t| trace.address_hash(t))
+    }
+
+    /// The sweep with the members of the present state.
+    fn sweep_in(&mut self, trace: &mut Trace) -> &mut Sweep {
+        let selection = self.selection(trace);
+        let of = trace.listed(selection);
+        let sweep = match self.sweep.take() {
+            Some(sweep) if Arc::ptr_eq(&sweep.of, of) => sweep,
+            before => {
+                let (of, order) = (Arc::clone(of), trace.in_program_order(selection));
+                let last = before.and_then(|s| s.last());
+                let visited = last.map_or(0, |last| {
+                    order.iter().position(|t| *t == last).map_or(order.len(), |i| i + 1)
+                });
+                Sweep { of, order, visited }
             }
-            return self.sweep.as_ref()?.order.get(at.member).map(|t| (*t, 1));
+        };
+        self.sweep.insert(sweep)
+    }
+
+    /// One member: chosen uniformly, with the number of candidates, or the next one of the
+    /// sweep, with 1.
+    pub(crate) fn pick(&mut self, trace: &mut Trace, rng: &mut Stream) -> Option<(Target, usize)> {
+        if self.scope.pick == Pick::Each {
+            let sweep = self.sweep_in(trace);
+            // Without a caller that counts, sweeps follow each other.
+            let next = if sweep.visited < sweep.order.len() { sweep.visited } else { 0 };
+            sweep.visited = next + 1;
+            return sweep.order.get(next).map(|t| (*t, 1));
         }
         let selection = self.selection(trace);
         let targets = trace.targets(selection);
@@ -257,17 +306,12 @@ impl Registered {
 
     /// The members that a step moves, and minus the log probability of choosing them: the
     /// log of the number of candidates.
-    pub fn members(
-        &mut self,
-        trace: &mut Trace,
-        at: &StepContext,
-        rng: &mut Stream,
-    ) -> (Vec<Target>, f64) {
+    pub(crate) fn members(&mut self, trace: &mut Trace, rng: &mut Stream) -> (Vec<Target>, f64) {
         if self.scope.pick == Pick::All {
             let selection = self.selection(trace);
             return (trace.targets(selection).to_vec(), 0.0);
         }
-        match self.pick(trace, at, rng) {
+        match self.pick(trace, rng) {
             Some((t, n)) => (vec![t], libm::log(n as f64)),
             None => (Vec::new(), 0.0),
         }
@@ -275,14 +319,23 @@ impl Registered {
 
     /// Minus the log probability of choosing the same members in the proposed state.
     /// Single-site choice contributes the ratio of the numbers of candidates to the
-    /// acceptance ratio; a sweep whose members change is rejected.
-    pub fn reverse_selection(&self, trace: &Trace) -> f64 {
+    /// acceptance ratio. A move of a sweep is rejected if its choice is then no member.
+    pub(crate) fn reverse_selection(&self, trace: &Trace) -> f64 {
         let Some((_, selection)) = self.selection else { return 0.0 };
         match (self.scope.pick, &self.sweep) {
             (Pick::One, _) => libm::log(trace.targets(selection).len() as f64),
-            (Pick::Each, Some(s)) if !Arc::ptr_eq(&s.of, trace.listed(selection)) => f64::INFINITY,
+            (Pick::Each, Some(s)) if !Arc::ptr_eq(&s.of, trace.listed(selection)) => {
+                let stays = s.last().is_some_and(|t| trace.targets(selection).contains(&t));
+                if stays { 0.0 } else { f64::INFINITY }
+            }
             _ => 0.0,
         }
+    }
+}
+
+impl Sweep {
+    fn last(&self) -> Option<Target> {
+        self.order.get(self.visited.checked_sub(1)?).copied()
     }
 }
 

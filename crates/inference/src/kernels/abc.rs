@@ -85,7 +85,7 @@ pub(super) fn step_within(
     (distance, eps): (&mut f64, f64),
     span: Span,
 ) -> TraceResult<Outcome> {
-    if kernel.sweep(trace).is_some() {
+    if kernel.sweep(trace, None).is_some() {
         return Err(fail(span, "abc takes a kernel that makes a single step, not each(…)".into()));
     }
     let before = trace.constraints();

@@ -104,10 +104,18 @@ impl Kernel for Delayed {
         self.kernel.load(state)
     }
 
-    fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
+    fn sweep(&mut self, trace: &mut Trace, after: Option<u64>) -> Option<usize> {
         // Errors are reported by the step.
         self.follow(trace).ok()?;
-        self.kernel.sweep(self.surrogate.as_mut()?)
+        self.kernel.sweep(self.surrogate.as_mut()?, after)
+    }
+
+    fn remaining(&mut self, _: &mut Trace) -> usize {
+        self.surrogate.as_mut().map_or(0, |surrogate| self.kernel.remaining(surrogate))
+    }
+
+    fn visited(&mut self, _: &Trace) -> Option<u64> {
+        self.kernel.visited(self.surrogate.as_ref()?)
     }
 
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
@@ -115,8 +123,7 @@ impl Kernel for Delayed {
         let Some(surrogate) = &mut self.surrogate else { return Ok(Outcome::default()) };
         let before = tempered(surrogate, at.power);
         let beyond = trace.beyond(surrogate);
-        let inner =
-            self.kernel.step(surrogate, &StepContext { member: at.member, ..at.within(0) })?;
+        let inner = self.kernel.step(surrogate, &at.within(0))?;
         surrogate.rollback();
         if inner.accepted == 0 {
             return Ok(Outcome { site: None, ..inner });

@@ -222,8 +222,8 @@ impl Kernel for Drift {
         "drift".into()
     }
 
-    fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
-        self.scope.sweep(trace)
+    fn scope(&mut self) -> Option<&mut Registered> {
+        Some(&mut self.scope)
     }
 
     fn save(&self, _: &Trace) -> Vec<u8> {
@@ -237,7 +237,7 @@ impl Kernel for Drift {
 
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let (targets, ways) = self.scope.members(trace, at, &mut rng);
+        let (targets, ways) = self.scope.members(trace, &mut rng);
         if targets.is_empty() {
             return Ok(Outcome::default());
         }

@@ -56,9 +56,13 @@ impl Kernel for Elliptical {
         "elliptical".into()
     }
 
+    fn scope(&mut self) -> Option<&mut Registered> {
+        Some(&mut self.scope)
+    }
+
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let (targets, _) = self.scope.members(trace, at, &mut rng);
+        let (targets, _) = self.scope.members(trace, &mut rng);
         if targets.is_empty() {
             return Ok(Outcome::default());
         }

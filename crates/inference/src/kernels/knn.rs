@@ -365,9 +365,13 @@ impl Kernel for Knn {
         "knn".into()
     }
 
+    fn scope(&mut self) -> Option<&mut Registered> {
+        Some(&mut self.scope)
+    }
+
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let (targets, ways) = self.scope.members(trace, at, &mut rng);
+        let (targets, ways) = self.scope.members(trace, &mut rng);
         let here: Vec<Place> = targets.iter().filter_map(|t| Place::of(trace, *t)).collect();
         if targets.is_empty() || here.len() != targets.len() {
             return Ok(Outcome::default());

@@ -33,13 +33,13 @@ impl Kernel for Mh {
         "mh".into()
     }
 
-    fn sweep(&mut self, trace: &mut Trace) -> Option<usize> {
-        self.scope.sweep(trace)
+    fn scope(&mut self) -> Option<&mut Registered> {
+        Some(&mut self.scope)
     }
 
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let Some((target, n)) = self.scope.pick(trace, at, &mut rng) else {
+        let Some((target, n)) = self.scope.pick(trace, &mut rng) else {
             return Ok(Outcome::default());
         };
         let proposed = trace.propose(&[(target, Change::Resample)], at.draws(0));

@@ -216,6 +216,10 @@ impl Kernel for Slice {
         "slice".into()
     }
 
+    fn scope(&mut self) -> Option<&mut Registered> {
+        Some(&mut self.scope)
+    }
+
     fn save(&self, _: &Trace) -> Vec<u8> {
         pack(&in_order(&self.learnt).into_iter().collect::<Vec<_>>())
     }
@@ -228,7 +232,7 @@ impl Kernel for Slice {
 
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let (targets, _) = self.scope.members(trace, at, &mut rng);
+        let (targets, _) = self.scope.members(trace, &mut rng);
         let site = if let [one] = targets[..] { Some(one) } else { None };
         let mut outcome = Outcome { site, ..Default::default() };
         for target in targets {

@@ -4,7 +4,7 @@ use super::place::Doing;
 use super::runner::{Flow, Instance, Runner};
 use crate::calls::build::{Setting, arguments, build};
 use crate::calls::error::fail;
-use crate::kernel::{Outcome, StepContext};
+use crate::kernel::Outcome;
 use crate::run::ChainError;
 use crate::stats::KernelStats;
 use pcadlang_engine::lang::plan::{Callee, Formula, KernelCall, Step};
@@ -63,22 +63,27 @@ impl<'a> Runner<'a> {
             self.pause();
         }
         let begun = Instant::now();
-        let (mut steps, mut done) = match doing {
-            Doing::Kernel { steps, done, .. } => (steps, done),
-            _ => (0, Outcome::default()),
+        let (mut steps, after, mut done) = match doing {
+            Doing::Kernel { steps, after, done, .. } => (steps, after, done),
+            _ => (0, None, Outcome::default()),
         };
         // A kernel that does not sweep over its choices makes one step.
-        let members =
-            self.instances[i].kernel.as_mut().and_then(|k| k.sweep(&mut self.trace)).unwrap_or(1);
+        let kernel = &mut self.instances[i].kernel;
+        let sweep = kernel.as_mut().and_then(|k| k.sweep(&mut self.trace, after));
+        let mut left = sweep.unwrap_or(usize::from(steps == 0));
         let mut over = steps > 0 && self.is_over();
-        while steps < members && !over {
-            done.add(self.step(i, steps)?);
+        while left > 0 && !over {
+            done.add(self.step(i)?);
             steps += 1;
+            let kernel = self.instances[i].kernel.as_mut().filter(|_| sweep.is_some());
+            left = kernel.map_or(0, |k| k.remaining(&mut self.trace));
             over = self.is_over();
             let asked = self.progress.checkpoints.load(Ordering::Relaxed);
             if asked != self.asked || over && (self.is_cancelled() || !self.in_warmup) {
                 self.asked = asked;
-                self.keep(Some(Doing::Kernel { arm, steps, done }))?;
+                let kernel = self.instances[i].kernel.as_mut();
+                let after = kernel.and_then(|k| k.visited(&self.trace));
+                self.keep(Some(Doing::Kernel { arm, steps, after, done }))?;
             }
         }
         if !self.in_warmup {
@@ -101,7 +106,7 @@ impl<'a> Runner<'a> {
             return Err(fail(call.span, message).into());
         }
         let declared = &self.plan.kernels[k];
-        self.note(Doing::Kernel { arm, steps: 0, done: Outcome::default() });
+        self.note(Doing::Kernel { arm, steps: 0, after: None, done: Outcome::default() });
         let depth = self.depth();
         if self.resume_path.is_empty() {
             let given = arguments(declared, call, &mut self.env())?;
@@ -116,8 +121,8 @@ impl<'a> Runner<'a> {
     }
 
     /// Makes one step of a kernel.
-    fn step(&mut self, i: usize, member: usize) -> Result<Outcome, ChainError> {
-        let at = StepContext { member, ..self.at() };
+    fn step(&mut self, i: usize) -> Result<Outcome, ChainError> {
+        let at = self.at();
         let Some(kernel) = &mut self.instances[i].kernel else { return Ok(Outcome::default()) };
         let outcome = kernel.step(&mut self.trace, &at)?;
         if self.options.sites && !self.in_warmup {

@@ -50,13 +50,15 @@ pub(super) enum Doing {
         /// All items; `None` if they are not all plain data.
         all: Option<Arc<[Plain]>>,
     },
-    /// A kernel that has made some of its steps.
+    /// A kernel, before, between or after its steps.
     Kernel {
         /// The index of its arm, if it is in a `mix`.
         arm: Option<usize>,
         /// The number of steps made.
         steps: usize,
-        /// What those steps did.
+        /// The address hash of the choice that its sweep has visited last.
+        after: Option<u64>,
+        /// What its steps did.
         done: Outcome,
     },
 }

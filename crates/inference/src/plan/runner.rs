@@ -188,9 +188,11 @@ impl<'a> Runner<'a> {
         StepContext { adapting: self.in_warmup, power: self.power, ..at }
     }
 
+    /// The randomness of what the state does not determine: predictions, and choices that
+    /// no observation depends on. It is new after every step and after every draw.
     pub fn predictive(&self) -> Draws {
         let key = StreamKey::new(self.options.seed, self.chain, Purpose::PREDICT);
-        Draws { key, step: self.step, substream: 0 }
+        Draws { key, step: self.step, substream: self.draws }
     }
 
     /// The environment of expressions.

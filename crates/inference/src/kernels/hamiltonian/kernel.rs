@@ -94,7 +94,7 @@ impl<T: Trajectory> Hamiltonian<T> {
         marginal: Option<Marginal>,
     ) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let (targets, _) = self.scope.members(trace, at, &mut rng);
+        let (targets, _) = self.scope.members(trace, &mut rng);
         match System::begin(trace, at, &targets, marginal, &mut self.memory)? {
             Some(begun) => {
                 Self::follow(&self.trajectory, &mut self.adaptation, begun, at, &mut rng)
@@ -111,7 +111,7 @@ impl<T: Trajectory> Hamiltonian<T> {
         sums: (Selection, Selection),
     ) -> TraceResult<Option<Outcome>> {
         let mut rng = at.stream();
-        let (targets, _) = self.scope.members(trace, at, &mut rng);
+        let (targets, _) = self.scope.members(trace, &mut rng);
         match System::begin_summed(trace, at, &targets, sums, &mut self.memory)? {
             Some(begun) => {
                 Self::follow(&self.trajectory, &mut self.adaptation, begun, at, &mut rng).map(Some)
@@ -147,6 +147,10 @@ impl<T: Trajectory> Hamiltonian<T> {
 impl<T: Trajectory + Send> Kernel for Hamiltonian<T> {
     fn name(&self) -> String {
         self.trajectory.name().into()
+    }
+
+    fn scope(&mut self) -> Option<&mut Registered> {
+        Some(&mut self.scope)
     }
 
     fn step_size(&self) -> Option<f64> {

@@ -276,13 +276,13 @@ impl Modes {
                 break;
             }
             let at = at.within(u64::from(i));
-            let (targets, _) = self.scope.members(trace, &at, &mut at.stream());
+            let (targets, _) = self.scope.members(trace, &mut at.stream());
             if recoverable(trace.regenerate(&targets, at.draws(0)))?.is_none() {
                 continue;
             }
             trace.commit();
             if let Some(first) = &mut self.first {
-                let (targets, _) = first.members(trace, &at, &mut at.stream());
+                let (targets, _) = first.members(trace, &mut at.stream());
                 climb(trace, &at, &targets, FIRST, &mut Past::new())?;
             }
             let likely = trace.log_likelihood();
@@ -311,7 +311,7 @@ impl Modes {
                 }
                 climbed += 1;
                 trace.restore(&c.state, at.draws(0))?;
-                let (targets, _) = self.scope.members(trace, at, &mut at.stream());
+                let (targets, _) = self.scope.members(trace, &mut at.stream());
                 climb(trace, at, &targets, steps, &mut c.past)?;
                 let mut log_jacobian = 0.0;
                 if let Some(here) = Here::of(trace, &targets) {
@@ -345,7 +345,7 @@ impl Modes {
         trace.commit();
         if at.adapting {
             // The mode is that of the surrogates; that of the observations is near it.
-            let (targets, _) = self.scope.members(trace, at, &mut at.stream());
+            let (targets, _) = self.scope.members(trace, &mut at.stream());
             climb(trace, &StepContext { power: 1.0, ..*at }, &targets, LAST, &mut Past::new())?;
         }
         Ok(())
@@ -363,7 +363,7 @@ impl Modes {
             tops.into_iter().filter(|t| t.height > highest - BEHIND).take(MOST)
         {
             trace.restore(&state, at.draws(0))?;
-            let (targets, _) = self.scope.members(trace, at, &mut at.stream());
+            let (targets, _) = self.scope.members(trace, &mut at.stream());
             let Some(here) = Here::of(trace, &targets) else { continue };
             let known = |m: &Mode| {
                 m.discrete == here.discrete
@@ -386,7 +386,7 @@ impl Modes {
         }
         let found = Found::new(signature.unwrap_or_default(), modes);
         trace.restore(&begun, at.draws(0))?;
-        let (targets, _) = self.scope.members(trace, at, &mut at.stream());
+        let (targets, _) = self.scope.members(trace, &mut at.stream());
         if at.adapting
             && let (Some(here), Some(mode)) =
                 (Here::of(trace, &targets), found.draw(&mut at.stream()))
@@ -475,7 +475,7 @@ impl Kernel for Modes {
             return Ok(Outcome::default());
         }
         let mut rng = at.stream();
-        let (targets, _) = self.scope.members(trace, at, &mut rng);
+        let (targets, _) = self.scope.members(trace, &mut rng);
         let (Some(found), Some(here)) = (&self.found, Here::of(trace, &targets)) else {
             return Ok(Outcome::default());
         };

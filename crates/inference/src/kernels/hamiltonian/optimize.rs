@@ -153,7 +153,7 @@ impl Kernel for Optimize {
 
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let mut rng = at.stream();
-        let (targets, _) = self.scope.members(trace, at, &mut rng);
+        let (targets, _) = self.scope.members(trace, &mut rng);
         let Some((mut system, begun)) = System::begin(trace, at, &targets, None, &mut self.memory)?
         else {
             return Ok(Outcome::default());
