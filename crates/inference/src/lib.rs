@@ -53,7 +53,7 @@ pub use kernel::{Kernel, Outcome, Pick, SiteSelection, StepContext, decide, reco
 pub use kernels::{
     Abc, AbcSmc, Delayed, Hamiltonian, Hmc, Independent, Knn, Nuts, Optimize, Smc, Temper, table,
 };
-pub use kernels::{Block, Drift, Elliptical, Gibbs, Mh, Slice};
+pub use kernels::{Block, Drift, Elliptical, Exact, Gibbs, Mh, Slice};
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
 pub use pause::Pause;
 use pcadlang_numerics::platform::threads as parallel;

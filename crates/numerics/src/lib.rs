@@ -5,6 +5,7 @@
 #![warn(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 pub mod dist;
+pub mod elimination;
 pub mod num;
 pub mod platform;
 pub mod rng;

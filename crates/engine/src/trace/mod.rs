@@ -44,7 +44,7 @@ use crate::lang::value::Value;
 pub use gradient::Recording;
 use graph::Graph;
 use journal::Before;
-pub use marginal::{Elimination, Explored, Marginal};
+pub use marginal::{Elimination, Explored, Marginal, Tabulated, Tabulation};
 use node::NONE;
 use std::sync::Arc;
 

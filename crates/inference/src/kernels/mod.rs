@@ -6,6 +6,7 @@ mod block;
 mod delayed;
 mod drift;
 mod elliptical;
+mod exact;
 mod gibbs;
 mod hamiltonian;
 mod involution;
@@ -25,6 +26,7 @@ pub use block::Block;
 pub use delayed::Delayed;
 pub use drift::Drift;
 pub use elliptical::Elliptical;
+pub use exact::Exact;
 pub use gibbs::Gibbs;
 pub use hamiltonian::{Hamiltonian, Hmc, Nuts, Optimize};
 pub use knn::Knn;
@@ -45,6 +47,7 @@ const ROWS: &[KernelRow] = &[
     block::ROW,
     drift::ROW,
     gibbs::ROW,
+    exact::ROW,
     elliptical::ROW,
     slice::ROW,
     hmc::ROW,

@@ -11,9 +11,9 @@ use super::build::Builder;
 use super::log_sum_exp::{LogSumExp, Term, Terms};
 use super::op::{Op, runs};
 use super::summed::Summed;
+use pcadlang_numerics::elimination::min_fill;
 use pcadlang_numerics::num::Column;
 use smallvec::SmallVec;
-use std::collections::BTreeSet;
 
 /// The maximum number of entries of a table.
 const LARGEST: usize = 4096;
@@ -72,27 +72,17 @@ impl Builder {
         let mut terms = 0;
         let mut alive: Vec<Option<(Vec<usize>, Vec<Terms>)>> = Vec::new();
         let mut of_choice: Vec<Vec<usize>> = vec![Vec::new(); counts.len()];
-        let mut near: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); counts.len()];
+        let scopes: Vec<&[usize]> = factors.iter().map(|f| &f.scope[..]).collect();
+        // Among equals in the order in which their factors were recorded, so that their sums
+        // read consecutive numbers.
+        let order = min_fill(counts.len(), &scopes);
         for f in factors {
-            for x in &f.scope {
-                of_choice[*x].push(alive.len());
-                near[*x].extend(f.scope.iter().filter(|y| *y != x));
-            }
+            f.scope.iter().for_each(|x| of_choice[*x].push(alive.len()));
             let tables = f.entries.into_iter().map(|e| self.terms_of(e)).collect();
             alive.push(Some((f.scope, tables)));
         }
-        // Those with the fewest neighbours first; among equals in the order in which their
-        // factors were recorded, so that their sums read consecutive numbers.
-        let mut order: Vec<usize> = (0..counts.len()).collect();
-        order.sort_by_key(|x| of_choice[*x].first().copied());
-        let mut rank = vec![0; counts.len()];
-        order.iter().enumerate().for_each(|(i, x)| rank[*x] = i);
-        let mut open: BTreeSet<(usize, usize)> =
-            near.iter().zip(&rank).map(|(n, rank)| (n.len(), *rank)).collect();
         let mut roots = Vec::new();
-        while let Some((_, first)) = open.pop_first() {
-            let x = order[first];
-            let others: Vec<usize> = std::mem::take(&mut near[x]).into_iter().collect();
+        for (x, others) in order {
             let given: Vec<(usize, usize)> = others.iter().map(|y| (*y, counts[*y])).collect();
             let size = given.iter().try_fold(counts[x], |n, g| n.checked_mul(g.1))?;
             if size > LARGEST {
@@ -117,13 +107,7 @@ impl Builder {
                     .collect();
                 sums.push(self.log_sum_exp(values));
             }
-            for y in &others {
-                open.remove(&(near[*y].len(), rank[*y]));
-                near[*y].remove(&x);
-                near[*y].extend(others.iter().filter(|z| *z != y));
-                open.insert((near[*y].len(), rank[*y]));
-                of_choice[*y].push(alive.len());
-            }
+            others.iter().for_each(|y| of_choice[*y].push(alive.len()));
             let live = |at: &usize| Term {
                 column: Column { at: *at, step: 0, live: true },
                 observed: false,

@@ -12,8 +12,11 @@ mod hold;
 mod partition;
 mod reads;
 mod recorded;
+mod states;
+mod tabulated;
 
 pub use explore::Explored;
+pub use tabulated::{Tabulated, Tabulation};
 
 use super::node::*;
 use super::{Change, ChoiceKind, Selector, Target, Trace};

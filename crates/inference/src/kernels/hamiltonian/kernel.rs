@@ -7,6 +7,7 @@ use super::point::Point;
 use super::summed::with_alternatives;
 use super::system::System;
 use crate::kernel::{Kernel, Outcome, Pick, Registered, SiteSelection, StepContext};
+use crate::kernels::exact::Exact;
 use crate::state::{StateError, pack, unpack};
 use pcadlang_engine::trace::{Marginal, Selection, Selector, Trace, TraceResult};
 use pcadlang_numerics::rng::Stream;
@@ -52,6 +53,8 @@ pub struct Hamiltonian<T> {
     scope: Registered,
     /// Finite choices that are summed out.
     summed: Registered,
+    /// Draws them where nothing else moves.
+    exact: Exact,
     adaptation: Adaptation,
     memory: Memory,
 }
@@ -70,6 +73,7 @@ impl<T> Hamiltonian<T> {
             trajectory,
             scope,
             summed,
+            exact: Exact::new(Selector::Nothing),
             adaptation: Adaptation::new(target, step),
             memory: Memory::default(),
         }
@@ -79,6 +83,7 @@ impl<T> Hamiltonian<T> {
     #[must_use]
     pub fn summing_out(self, choices: Selector) -> Self {
         Hamiltonian {
+            exact: Exact::new(choices.clone()),
             summed: Registered::new(SiteSelection { selector: choices, pick: Pick::All }),
             ..self
         }
@@ -157,6 +162,10 @@ impl<T: Trajectory + Send> Kernel for Hamiltonian<T> {
         self.adaptation.step_size()
     }
 
+    fn log_evidence(&self) -> Option<f64> {
+        self.exact.log_evidence()
+    }
+
     fn save(&self, trace: &Trace) -> Vec<u8> {
         pack(&(&self.adaptation, self.memory.habits(trace)))
     }
@@ -171,6 +180,9 @@ impl<T: Trajectory + Send> Kernel for Hamiltonian<T> {
         let selections = (self.summed.selection(trace), self.scope.selection(trace));
         if trace.targets(selections.0).is_empty() {
             return self.go(trace, at, None);
+        }
+        if trace.targets(selections.1).is_empty() {
+            return self.exact.draw(trace, at);
         }
         if let Some(outcome) = self.go_summed(trace, at, selections)? {
             return Ok(outcome);

@@ -1,0 +1,236 @@
+//! The states in which the scores of finite choices take all their values.
+//!
+//! Scores that depend on the same choices are a factor, with an entry for each joint value of
+//! these. If no factor depends on two choices of one colour, all entries occur among the
+//! states that give all choices of a colour their values together: as many as joint values of
+//! the colours, however many choices there are. The trace is brought into each of these.
+//!
+//! As in [`super::explore`], what a factor depends on is what its evaluation reads, in any of
+//! the states; if a state shows that it reads more, the states are visited again.
+
+use super::Partition;
+use super::reads::{Label, Reader, Sets};
+use crate::lang::code::Op;
+use crate::trace::gradient::Given;
+use crate::trace::node::*;
+use crate::trace::{Change, Draws, Target, Trace};
+use pcadlang_numerics::dist::{Datum, Support};
+use rustc_hash::{FxHashMap, FxHashSet};
+use std::collections::BTreeMap;
+
+/// Finite choices that are summed out, and what was found about them.
+pub(super) struct Sites {
+    pub targets: Vec<Target>,
+    pub values: Vec<Vec<Datum>>,
+    supports: Vec<Support>,
+    /// The labels of these choices, and of those that move.
+    own: FxHashMap<NodeId, Label>,
+    colours: Vec<usize>,
+    /// By factor: the choices that it depends on, in ascending order.
+    pub scopes: BTreeMap<NodeId, Vec<usize>>,
+}
+
+/// Why not all states can be visited.
+#[derive(Debug)]
+pub(super) enum Halt {
+    /// In this state other choices appear or vanish.
+    Structure(Vec<(Target, Change)>),
+    /// The program fails in a state.
+    Fails,
+    /// Other reasons.
+    Cannot(&'static str),
+}
+
+/// A state that is being visited.
+pub(super) struct Visited<'a> {
+    /// Whether it is the first one.
+    pub first: bool,
+    /// The index of each choice's value.
+    pub indices: &'a [usize],
+    /// All choices of the trace.
+    pub choices: &'a [NodeId],
+    /// Through which of their values the choices determine each node, if that was asked for.
+    pub given: &'a FxHashMap<NodeId, Option<Given>>,
+}
+
+impl Trace {
+    /// The choices of `sites` with their values, for a kernel that moves those of `targets`.
+    pub(super) fn sites(&self, targets: &[Target], sites: &[Target]) -> Result<Sites, &'static str> {
+        let mut own: FxHashMap<NodeId, Label> = FxHashMap::default();
+        own.extend(targets.iter().map(|t| (t.node, Label { site: NONE, moves: true, set: 0 })));
+        let (mut values, mut supports) = (Vec::new(), Vec::new());
+        for (i, t) in sites.iter().enumerate() {
+            let support = self.dist(*t).map(|d| d.stored_support()).filter(Support::is_finite);
+            let all = support.as_ref().and_then(Support::finite_values).unwrap_or_default();
+            let (Some(support), false) = (support, all.is_empty()) else {
+                return Err("it is not a discrete choice with finitely many values");
+            };
+            let label = Label { site: i as u32, moves: false, set: i as u32 + 1 };
+            if t.element != NONE || own.insert(t.node, label).is_some() {
+                return Err("it is an element of a larger choice");
+            }
+            values.push(all);
+            supports.push(support);
+        }
+        let (colours, scopes) = (vec![0; sites.len()], BTreeMap::new());
+        Ok(Sites { targets: sites.to_vec(), values, supports, own, colours, scopes })
+    }
+
+    /// Brings the trace into at most `most` states in which all entries of all factors occur,
+    /// and calls `at` in each of them once all that factors depend on is known. If that turns
+    /// out not to be known, it is called again for all states, beginning with a first one.
+    pub(super) fn visit_states(
+        &mut self,
+        sites: &mut Sites,
+        (most, with_given): (usize, bool),
+        draws: Draws,
+        mut at: impl FnMut(&mut Trace, &Sites, Visited) -> Result<(), Halt>,
+    ) -> Result<(), Halt> {
+        loop {
+            let counts = sites.colour();
+            let states = counts.iter().try_fold(1, |n: usize, c| n.checked_mul(*c));
+            let states = states.filter(|n| *n <= most);
+            let states = states.ok_or(Halt::Cannot("too many choices depend on each other"))?;
+            let mut known = true;
+            for state in 0..states {
+                let indices = sites.indices(&counts, state);
+                self.go_to(sites, &indices, draws)?;
+                let mut partition = Partition::default();
+                partition.grow(sites.targets.len());
+                let choices: Vec<NodeId> = self.all_targets().iter().map(|t| t.node).collect();
+                let mut reader = Reader::new(&self.graph, &self.code, &sites.own, &mut partition);
+                reader.sets = Some(Sets::singletons(sites.targets.len()));
+                reader.read_all(choices.iter().copied());
+                let found = &reader.found;
+                let sets = reader.sets.as_ref().filter(|s| !s.overflow);
+                let sets = sets.ok_or(Halt::Cannot("too many choices depend on each other"))?;
+                if found.structure_moves {
+                    return Err(Halt::Cannot("which choices exist depends on others that move"));
+                }
+                if found.anywhere || found.unclear {
+                    return Err(Halt::Cannot("observations are made in a `mem` function"));
+                }
+                known &= !widen(&mut sites.scopes, &found.factors, sets);
+                if !known {
+                    continue;
+                }
+                let given = if with_given { reader.given(&indices) } else { FxHashMap::default() };
+                let (first, indices, choices) = (state == 0, &indices[..], &choices[..]);
+                at(self, sites, Visited { first, indices, choices, given: &given })?;
+            }
+            if known {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Gives the choices their values in a state.
+    fn go_to(&mut self, sites: &Sites, indices: &[usize], draws: Draws) -> Result<(), Halt> {
+        let values = sites.values.iter().zip(indices).map(|(v, i)| Change::Set(v[*i].clone()));
+        let changes: Vec<_> = sites.targets.iter().copied().zip(values).collect();
+        let weight = self.propose(&changes, draws).map_err(|_| Halt::Fails)?;
+        let same =
+            |(t, s): (&Target, &Support)| self.dist(*t).is_some_and(|d| d.stored_support() == *s);
+        let halt = if weight.appeared + weight.vanished > 0 {
+            Some(Halt::Structure(changes))
+        } else if self.detaches_held() {
+            Some(Halt::Cannot("which choices exist depends on it"))
+        } else if !sites.targets.iter().zip(&sites.supports).all(same) {
+            Some(Halt::Cannot("its possible values depend on other choices"))
+        } else {
+            None
+        };
+        match halt {
+            None => self.commit(),
+            Some(_) => self.rollback(),
+        }
+        halt.map_or(Ok(()), Err)
+    }
+
+    /// Returns all nodes with scores, each with the factor that it is part of.
+    pub(super) fn scores_by_factor(
+        &self,
+        scopes: &BTreeMap<NodeId, Vec<usize>>,
+        choices: &[NodeId],
+    ) -> Vec<(Option<NodeId>, NodeId)> {
+        let is_score = |n: &NodeId| {
+            self.graph.nodes[*n as usize].state == State::Clean
+                && matches!(self.graph.op(&self.code, *n), Op::Observe { .. } | Op::Factor { .. })
+        };
+        let mut all: Vec<NodeId> = (0..self.graph.nodes.len() as NodeId).filter(is_score).collect();
+        all.extend(choices);
+        all.sort_unstable();
+        all.dedup();
+        let factor = |n: NodeId| {
+            if matches!(self.graph.op(&self.code, n), Op::Draw { .. }) {
+                return scopes.contains_key(&n).then_some(n);
+            }
+            let (mut at, mut outermost) = (n, None);
+            while at != NONE {
+                outermost = Some(at).filter(|at| scopes.contains_key(at)).or(outermost);
+                at = self.graph.frames[self.graph.nodes[at as usize].frame as usize].owner;
+            }
+            outermost
+        };
+        all.into_iter().map(|n| (factor(n), n)).collect()
+    }
+}
+
+impl Sites {
+    /// Colours the choices so that no factor depends on two of one colour. Returns the
+    /// number of values by colour.
+    fn colour(&mut self) -> Vec<usize> {
+        let n = self.targets.len();
+        let mut near: Vec<FxHashSet<usize>> = vec![FxHashSet::default(); n];
+        for scope in self.scopes.values() {
+            for x in scope {
+                near[*x].extend(scope.iter().filter(|y| *y != x));
+            }
+        }
+        let mut counts: Vec<usize> = Vec::new();
+        for x in 0..n {
+            let taken: FxHashSet<usize> =
+                near[x].iter().filter(|y| **y < x).map(|y| self.colours[*y]).collect();
+            let colour = (0..).find(|c| !taken.contains(c)).unwrap_or(taken.len());
+            self.colours[x] = colour;
+            counts.resize(counts.len().max(colour + 1), 1);
+            counts[colour] = counts[colour].max(self.values[x].len());
+        }
+        counts
+    }
+
+    /// Returns the index of each choice's value in a state.
+    fn indices(&self, counts: &[usize], mut state: usize) -> Vec<usize> {
+        let by_colour: Vec<usize> = counts
+            .iter()
+            .map(|n| {
+                let value = state % n;
+                state /= n;
+                value
+            })
+            .collect();
+        self.colours.iter().zip(&self.values).map(|(c, v)| by_colour[*c] % v.len()).collect()
+    }
+}
+
+/// Adds what factors depend on; true if any depends on more than was known.
+fn widen(
+    scopes: &mut BTreeMap<NodeId, Vec<usize>>,
+    factors: &[(NodeId, u32)],
+    sets: &Sets,
+) -> bool {
+    let mut wider = false;
+    for (n, set) in factors {
+        let scope = scopes.entry(*n).or_insert_with(|| {
+            wider = true;
+            Vec::new()
+        });
+        for x in sets.members(*set) {
+            if let Err(place) = scope.binary_search(&(*x as usize)) {
+                scope.insert(place, *x as usize);
+                wider = true;
+            }
+        }
+    }
+    wider
+}

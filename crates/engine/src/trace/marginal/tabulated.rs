@@ -1,0 +1,229 @@
+//! The joint density of finite choices given the rest, as tables.
+//!
+//! The entries of each factor are evaluated in the first of the states in which they occur
+//! ([`super::states`]). A finite choice that only other values need is one of the choices
+//! too, from whichever state the tables are made: where nothing needs it, it has its prior,
+//! and is not kept.
+
+use super::states::{Halt, Sites, Visited};
+use crate::lang::error::RunError;
+use crate::trace::node::{NONE, NodeId};
+use crate::trace::{Change, Constraint, Draws, Selection, Target, Trace, TraceResult};
+use pcadlang_numerics::dist::Datum;
+use pcadlang_numerics::elimination::Factor;
+use pcadlang_numerics::num::ExactSum;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// The maximum number of states in which scores are evaluated, and of entries of a factor.
+const MOST: usize = 1 << 14;
+
+/// Tables of the joint density of finite choices.
+#[derive(Clone, Debug, Default)]
+pub struct Tabulated {
+    /// The hashes of the addresses of the choices, and the values of each.
+    choices: Vec<(u64, Vec<Datum>)>,
+    /// What depends on the choices, which are numbered from 0.
+    pub factors: Vec<Factor>,
+    /// The log density of what depends on none of them.
+    pub rest: f64,
+}
+
+/// The result of [`Trace::tabulate`].
+#[derive(Debug)]
+pub enum Tabulation {
+    /// The tables.
+    Tables(Tabulated),
+    /// The program fails at some values of the choices.
+    Fails,
+    /// The choices have no such tables; why, with the address of one of them.
+    Refused(Box<RunError>),
+}
+
+impl Tabulated {
+    /// The number of values of each choice.
+    pub fn counts(&self) -> Vec<usize> {
+        self.choices.iter().map(|(_, values)| values.len()).collect()
+    }
+}
+
+/// Tables under construction.
+#[derive(Default)]
+struct Tables {
+    factors: Vec<Factor>,
+    places: FxHashMap<NodeId, usize>,
+    rest: f64,
+}
+
+impl Trace {
+    /// Tabulates the log prior plus `power` times the log likelihood as a function of the
+    /// selected choices, given all others. The state stays the same.
+    ///
+    /// # Errors
+    /// If the state cannot be restored.
+    pub fn tabulate(
+        &mut self,
+        selection: Selection,
+        power: f64,
+        draws: Draws,
+    ) -> TraceResult<Tabulation> {
+        self.rollback();
+        let before = self.constraints();
+        let others = self.beside(selection);
+        let mut held = Vec::new();
+        let done = loop {
+            match self.hold_choices() {
+                Ok(more) => held.push(more),
+                Err(e) => break Tabulation::Refused(e),
+            }
+            let targets = self.targets(selection).to_vec();
+            let Some(first) = targets.first().copied() else {
+                break Tabulation::Tables(Tabulated::default());
+            };
+            let refused = |trace: &Trace, why| Tabulation::Refused(trace.cannot_sum(first, why));
+            let mut sites = match self.sites(&[], &targets) {
+                Ok(sites) => sites,
+                Err(why) => break refused(self, why),
+            };
+            let mut tables = Tables::default();
+            let visit = |trace: &mut Trace, sites: &Sites, state: Visited| {
+                tables.enter(trace, sites, state, power)
+            };
+            match self.visit_states(&mut sites, (MOST, false), draws, visit) {
+                Ok(()) => break self.tabulated(&sites, tables),
+                Err(Halt::Fails) => break Tabulation::Fails,
+                Err(Halt::Cannot(why)) => break refused(self, why),
+                // Selected choices that appear are among those of the next round.
+                Err(Halt::Structure(changes)) => {
+                    let appeared = self.propose(&changes, draws)?.appeared;
+                    self.commit();
+                    if appeared == 0 || self.beside(selection) != others {
+                        break refused(self, "other choices are created or removed with it");
+                    }
+                }
+            }
+        };
+        self.rollback();
+        for h in held {
+            self.release_held(h)?;
+        }
+        self.restore(&before, draws)?;
+        Ok(done)
+    }
+
+    /// The choices that are not selected.
+    fn beside(&self, selection: Selection) -> FxHashSet<u64> {
+        let hash = |t: &Target| self.address_hash(*t);
+        let selected: FxHashSet<u64> = self.targets(selection).iter().map(hash).collect();
+        self.all_targets().iter().map(hash).filter(|h| !selected.contains(h)).collect()
+    }
+
+    fn tabulated(&self, sites: &Sites, tables: Tables) -> Tabulation {
+        let hash = |t: &Target| self.address_hash(*t);
+        let choices = sites.targets.iter().map(hash).zip(sites.values.iter().cloned()).collect();
+        let Tables { factors, rest, .. } = tables;
+        if factors.iter().any(|f| f.table.iter().any(|x| x.is_nan())) {
+            let why = "not all of its values occur together with those of the others";
+            return Tabulation::Refused(self.cannot_sum(sites.targets[0], why));
+        }
+        Tabulation::Tables(Tabulated { choices, factors, rest })
+    }
+
+    /// Gives the choices of tables the values with these indices. False, with the state as it
+    /// was, if another choice would appear or vanish, or the program fails.
+    ///
+    /// # Errors
+    /// If the program fails in a way that does not depend on the values.
+    pub fn assign(
+        &mut self,
+        tables: &Tabulated,
+        indices: &[usize],
+        selection: Selection,
+        draws: Draws,
+    ) -> TraceResult<bool> {
+        self.rollback();
+        let (mut changes, mut constraints) = (Vec::new(), Vec::new());
+        for ((hash, values), i) in tables.choices.iter().zip(indices) {
+            let value = values[*i].clone();
+            match self.graph.choices.find(*hash) {
+                Some(node) => {
+                    let target = Target { node, element: NONE };
+                    if self.stored(target).as_ref() != Some(&value) {
+                        changes.push((target, Change::Set(value)));
+                    }
+                }
+                None => constraints.push((*hash, Constraint::Stored(value))),
+            }
+        }
+        let count = |trace: &Trace| trace.choice_count() - trace.targets(selection).len();
+        let others = count(self);
+        match self.propose_constrained(&changes, &constraints, draws) {
+            Ok(_) if count(self) == others => {
+                self.commit();
+                Ok(true)
+            }
+            Ok(_) => {
+                self.rollback();
+                Ok(false)
+            }
+            Err(e) if e.is_recoverable() => Ok(false),
+            Err(e) => Err(e),
+        }
+    }
+}
+
+impl Tables {
+    /// Enters the entries that occur in a state for the first time.
+    fn enter(
+        &mut self,
+        trace: &Trace,
+        sites: &Sites,
+        state: Visited,
+        power: f64,
+    ) -> Result<(), Halt> {
+        if state.first {
+            *self = Tables::default();
+        }
+        let counts: Vec<usize> = sites.values.iter().map(Vec::len).collect();
+        // The entry of each factor that this state shows first.
+        let mut open: FxHashMap<NodeId, (usize, usize)> = FxHashMap::default();
+        for (node, scope) in &sites.scopes {
+            let size = scope.iter().try_fold(1, |n: usize, x| n.checked_mul(counts[*x]));
+            let size = size.filter(|n| *n <= MOST);
+            let size = size.ok_or(Halt::Cannot("too many choices depend on each other"))?;
+            let factors = &mut self.factors;
+            let place = *self.places.entry(*node).or_insert_with(|| {
+                // NaN until an entry has been evaluated.
+                factors.push(Factor { scope: scope.clone(), table: vec![f64::NAN; size] });
+                factors.len() - 1
+            });
+            let entry = scope.iter().rev().fold(0, |p, x| p * counts[*x] + state.indices[*x]);
+            if factors[place].table[entry].is_nan() {
+                open.insert(*node, (place, entry));
+            }
+        }
+        let mut sums: FxHashMap<NodeId, [ExactSum; 2]> = FxHashMap::default();
+        let mut base: [ExactSum; 2] = Default::default();
+        for (factor, n) in trace.scores_by_factor(&sites.scopes, state.choices) {
+            let [prior, likelihood] = match factor {
+                None if state.first => &mut base,
+                Some(f) if open.contains_key(&f) => sums.entry(f).or_default(),
+                _ => continue,
+            };
+            trace.graph.put_scored(&trace.code, n, prior, likelihood);
+        }
+        let tempered = |[prior, likelihood]: &[ExactSum; 2]| {
+            let likelihood = likelihood.value();
+            // An impossible state is impossible at every power.
+            let scaled = if likelihood == f64::NEG_INFINITY { likelihood } else { power * likelihood };
+            prior.value() + scaled
+        };
+        if state.first {
+            self.rest = tempered(&base);
+        }
+        for (node, (place, entry)) in open {
+            // Observations of a factor may be absent in a state.
+            self.factors[place].table[entry] = sums.get(&node).map_or(0.0, tempered);
+        }
+        Ok(())
+    }
+}
