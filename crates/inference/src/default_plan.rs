@@ -1,140 +1,281 @@
-//! The plan of a program without an `infer` block. It depends on the kinds of the
-//! program's choices, and is printed so that it can be copied.
+//! The plan of a program without an `infer` block. It depends on the program's choices and
+//! on how its density behaves in several draws, and is printed so that it can be copied.
 
-use pcadlang_engine::trace::{ChoiceKind, Draws, Selector, Trace};
+use super::init::{attempts, free_density};
+use super::kernels::approach;
+use crate::StepContext;
+use pcadlang_engine::lang::address::Address;
+use pcadlang_engine::lang::code::Code;
+use pcadlang_engine::trace::{
+    Change, ChoiceKind, Draws, Limits, Selector, Tabulation, Target, Trace, TraceResult,
+};
+use pcadlang_numerics::elimination::Elimination;
+use pcadlang_numerics::rng::{Purpose, StreamKey};
+use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// A gradient with choices summed out pays if it sums at most this many times as many
 /// scores as a sweep of `gibbs` evaluates. On a tape a score takes a small part of the time
 /// that `gibbs` takes for it, a transition needs several gradients, and a sum never mixes
 /// worse than a sweep.
 const SUM_PAYS: usize = 4;
+/// The same for exact draws of finite choices that depend on each other, among others that
+/// move: a sweep of `gibbs` may not mix at all.
+const EXACT_PAYS: usize = 16;
+/// The largest table of an exact draw.
+const LARGEST: usize = 1 << 20;
+/// The number of draws from the prior whose choices determine the plan, as another draw may
+/// have choices that the first one lacks.
+const DRAWS: u64 = 10;
+/// The most draws from the prior until one succeeds.
+const ATTEMPTS: u64 = 1000;
+/// The number of uniform starts that are compared with draws from the prior.
+const UNIFORM: u64 = 3;
+/// Draws from the prior lie far below if it is by more nats than this, and by more than this
+/// many per coordinate.
+const FAR: (f64, f64) = (100.0, 20.0);
+/// The most choices that are examined one by one.
+const FEW: usize = 50;
 
-/// The plan for a program, as program text, from the choices of several draws from its
-/// prior: another draw may have choices that the first one lacks.
+/// The plan for a program, as program text.
 ///
-/// If the density has a gradient, `nuts` moves all continuous choices together. If a tape
-/// can sum the finite choices out of the density at a similar cost as that of a sweep of
-/// `gibbs`, `nuts` does so, otherwise they are left to that sweep; other choices are left
-/// to kernels without gradients.
-/// `nuts` and sweeps stay within one structure: if the structure depends on their
-/// choices, single-site kernels are added that can change it.
-pub fn default_plan(draws: &mut [Trace]) -> String {
-    let mut count = |kind| {
-        let of = |trace: &mut Trace| {
-            let s = trace.select(&Selector::Kind(kind));
-            trace.targets(s).len()
-        };
-        draws.iter_mut().map(of).max().unwrap_or(0)
+/// If the density has a gradient that informs, `nuts` moves all continuous choices together,
+/// and `slice` those without one. If a tape can sum the finite choices out of the density at
+/// a similar cost as that of a sweep of `gibbs`, `nuts` does so; otherwise `exact` draws
+/// those that depend on each other, if its tables are small, and `gibbs` any others. `nuts`
+/// stays within one structure: if that depends on its choices, `mh` is added.
+///
+/// # Errors
+/// If no draw succeeds, so that the program's choices are unknown.
+pub fn default_plan(code: &Arc<Code>, limits: &Limits) -> TraceResult<String> {
+    let key = StreamKey::new(0, 0, Purpose::START);
+    let started = |spread, step| {
+        let draws = Draws { key, step, substream: 0 };
+        Trace::started(Arc::clone(code), [], spread, draws, limits.clone()).map(|(t, _)| t)
     };
-    let (continuous, discrete) = (count(ChoiceKind::Continuous), count(ChoiceKind::Discrete));
-    let (finite, gaussian) = (count(ChoiceKind::Finite), count(ChoiceKind::Gaussian));
+    let mut draws: Vec<Trace> = (0..DRAWS).filter_map(|i| started(None, i).ok()).collect();
+    let uniform = |i| started(Some(2.0), i);
+    if draws.is_empty() {
+        // Draws may fail, e.g. because a standard deviation is negative or overflows; the
+        // plan is then made from the first draw that succeeds.
+        let drawn = attempts(ATTEMPTS, |i| started(None, i));
+        draws.push(drawn.or_else(|e| attempts(ATTEMPTS, uniform).map_err(|_| e))?);
+    }
+    let mut program = Program { draws };
+    let (continuous, discrete) =
+        (program.count(ChoiceKind::Continuous), program.count(ChoiceKind::Discrete));
     if continuous + discrete == 0 {
-        return "infer {\n  repeat 1000 { }\n}\n".into();
+        return Ok("infer {\n  repeat 1000 { }\n}\n".into());
     }
-    if continuous > 0 && draws.iter_mut().all(has_gradient) {
-        let depends = |kind| draws.iter().any(|t: &Trace| t.structure_depends_on(kind));
-        let (on_continuous, on_finite) =
-            (depends(ChoiceKind::Continuous), depends(ChoiceKind::Finite));
-        if finite > 0 && draws.iter_mut().all(sum_pays) {
-            return with_gradient(
-                "nuts($continuous, marginal = $finite)",
-                (0, discrete - finite),
-                on_continuous,
-                false,
-            );
+    let finite = program.count(ChoiceKind::Finite);
+    let rough = program.rough();
+    let smooth = continuous > 0 && rough.as_ref().is_some_and(|r| r.len() < continuous);
+    let mut lines = Vec::new();
+    let far = continuous > 0 && program.lies_far(uniform);
+    if far {
+        lines.push("  // Draws from the prior are impossible, or far from the data.".to_owned());
+        lines.push("  init(uniform());".to_owned());
+    } else if finite < continuous + discrete || !program.is_exact(None) {
+        lines.push("  init(prior(20));".to_owned());
+    }
+    let mut pass = Vec::new();
+    let mut left = finite > 0;
+    if continuous > 0 && smooth {
+        let rough = rough.unwrap_or_default();
+        let minus: String = rough.iter().map(|r| format!(" - {r}")).collect();
+        if finite > 0 && rough.is_empty() && program.sum_pays() {
+            pass.push("nuts($continuous, marginal = $finite);".to_owned());
+            left = false;
+        } else {
+            pass.push(format!("nuts($continuous{minus});"));
         }
-        with_gradient("nuts($continuous)", (finite, discrete - finite), on_continuous, on_finite)
-    } else {
-        without_gradient(continuous, discrete, finite, gaussian)
-    }
-}
-
-/// Whether the density is differentiable with respect to the continuous choices.
-fn has_gradient(trace: &mut Trace) -> bool {
-    let selection = trace.select(&Selector::Kind(ChoiceKind::Continuous));
-    let targets = trace.targets(selection).to_vec();
-    trace.gradient(&targets, 1.0, &mut Vec::new()).is_ok()
-}
-
-/// Whether all finite choices can be summed out on a tape, and that costs little compared
-/// with a sweep over them.
-fn sum_pays(trace: &mut Trace) -> bool {
-    let of = |kind, trace: &mut Trace| {
-        let selection = trace.select(&Selector::Kind(kind));
-        trace.targets(selection).to_vec()
-    };
-    let (moving, sites) = (of(ChoiceKind::Continuous, trace), of(ChoiceKind::Finite, trace));
-    if moving.is_empty() || sites.is_empty() {
-        return false;
-    }
-    let recording = trace.record_summed(&moving, &sites, Draws::default()).ok().flatten();
-    recording.is_some_and(|r| {
-        let (sum, sweep) = r.scores();
-        sum <= SUM_PAYS * sweep
-    })
-}
-
-/// The plan with a kernel for the continuous choices, and numbers of finite choices that
-/// are left and of other discrete ones.
-fn with_gradient(
-    nuts: &str,
-    (finite, unbounded): (usize, usize),
-    on_continuous: bool,
-    on_finite: bool,
-) -> String {
-    let mut pass = format!(" {nuts};");
-    if on_continuous {
-        pass += " mh(one($continuous));";
-    }
-    if finite > 0 {
-        pass += " gibbs(each($finite));";
-    }
-    match finite {
-        _ if !on_finite => {}
-        0..4 => pass += " gibbs(one($finite));",
-        _ => pass += &format!(" repeat {} {{ gibbs(one($finite)); }}", (finite / 2).min(50)),
-    }
-    if unbounded > 0 {
-        pass += &format!(
-            " repeat {} {{ mh(one($discrete - $finite)); drift(one($discrete - $finite)); }}",
-            unbounded.min(50)
-        );
-    }
-    format!(
-        "infer {{\n  init(best_of(20));\n  warmup 1000 {{{pass} }}\n  repeat 1000 {{{pass} }}\n}}\n"
-    )
-}
-
-fn without_gradient(continuous: usize, discrete: usize, finite: usize, gaussian: usize) -> String {
-    let mut arms = Vec::new();
-    if continuous > 0 {
-        arms.push((5.0, "drift(one($continuous))"));
+        if !rough.is_empty() {
+            lines.push("  // The derivative of the density says nothing about what `slice` moves.".into());
+            let rough: Vec<String> = rough.into_iter().collect();
+            pass.push(format!("slice(each({}));", rough.join(" + ")));
+        }
+        if program.depends_on(ChoiceKind::Continuous) {
+            pass.push("mh(each($continuous));".to_owned());
+        }
+    } else if continuous > 0 {
+        lines.push("  // The derivative of the density says nothing, or does not exist.".into());
+        pass.push("slice(each($continuous));".to_owned());
+        if program.count(ChoiceKind::Gaussian) > 1 {
+            pass.push("elliptical($gaussian);".to_owned());
+        }
         if continuous > 1 {
-            arms.push((2.0, "drift($continuous)"));
+            pass.push("repeat 5 { drift($continuous); }".to_owned());
         }
-        arms.push((0.5, "mh(one($continuous))"));
-    }
-    if gaussian > 0 {
-        arms.push((
-            1.5,
-            if gaussian > 1 { "elliptical(one($gaussian))" } else { "elliptical($gaussian)" },
-        ));
-        if gaussian > 1 {
-            arms.push((1.0, "elliptical($gaussian)"));
+        if program.depends_on(ChoiceKind::Continuous) {
+            pass.push("mh(each($continuous));".to_owned());
         }
     }
-    if finite > 0 {
-        arms.push((4.0, "gibbs(one($finite))"));
+    let mut moves = !pass.is_empty() || discrete > finite;
+    if left {
+        let most = moves.then_some(EXACT_PAYS);
+        let exact = program.is_exact(most);
+        moves |= !exact;
+        pass.push(if exact { "exact($finite);" } else { "gibbs(each($finite));" }.to_owned());
     }
     if discrete > finite {
-        arms.push((3.0, "mh(one($discrete))"));
-        arms.push((1.0, "drift(one($discrete))"));
+        pass.push("mh(each($discrete - $finite));".to_owned());
+        pass.push("drift(each($discrete - $finite));".to_owned());
     }
-    let total: f64 = arms.iter().map(|(w, _)| w).sum();
-    let arms: String = arms.iter().map(|(w, k)| format!(" {:.2} => {k};", w / total)).collect();
-    let sweep = (continuous + discrete).clamp(10, 200);
-    format!(
-        "infer {{\n  init(best_of(20));\n  warmup {} {{ mix {{{arms} }} }}\n  repeat 1000 {{ repeat {sweep} {{ mix {{{arms} }} }} }}\n}}\n",
-        (sweep * 200).min(20_000)
-    )
+    let pass = pass.join(" ");
+    // Draws that are exact do not depend on where they begin.
+    if moves {
+        lines.push(format!("  warmup 1000 {{ {pass} }}"));
+    }
+    lines.push(format!("  repeat 1000 {{ {pass} }}"));
+    Ok(format!("infer {{\n{}\n}}\n", lines.join("\n")))
+}
+
+/// Several draws of a program.
+struct Program {
+    draws: Vec<Trace>,
+}
+
+/// The choices of a kind.
+fn of_kind(trace: &mut Trace, kind: ChoiceKind) -> Vec<Target> {
+    let selection = trace.select(&Selector::Kind(kind));
+    trace.targets(selection).to_vec()
+}
+
+impl Program {
+    /// The most choices of a kind that a draw has.
+    fn count(&mut self, kind: ChoiceKind) -> usize {
+        self.draws.iter_mut().map(|t| of_kind(t, kind).len()).max().unwrap_or(0)
+    }
+
+    /// Whether which choices exist depends on those of a kind.
+    fn depends_on(&self, kind: ChoiceKind) -> bool {
+        self.draws.iter().any(|t| t.structure_depends_on(kind))
+    }
+
+    /// The continuous choices about which a derivative of the density says nothing, as
+    /// selections; `None` if there is no derivative at all.
+    fn rough(&mut self) -> Option<BTreeSet<String>> {
+        let mut rough = BTreeSet::new();
+        // Choices whose derivative did not inform, and those that one did.
+        let (mut flat, mut informed) = (BTreeSet::new(), BTreeSet::new());
+        let mut any = false;
+        for trace in &mut self.draws {
+            let targets = of_kind(trace, ChoiceKind::Continuous);
+            let mut smooth = targets.clone();
+            if let Err(e) = trace.gradient(&targets, 1.0, &mut Vec::new()) {
+                if e.is_recoverable() {
+                    continue;
+                }
+                if targets.len() > FEW {
+                    return None;
+                }
+                smooth.retain(|t| trace.gradient(&[*t], 1.0, &mut Vec::new()).is_ok());
+                let names = targets.iter().filter(|t| !smooth.contains(t));
+                rough.extend(names.map(|t| pattern(&trace.address(*t))));
+            }
+            any |= !smooth.is_empty();
+            for t in smooth.into_iter().take(FEW) {
+                let name = pattern(&trace.address(t));
+                if !informed.contains(&name) {
+                    match informs(trace, t) {
+                        Some(true) => drop(informed.insert(name)),
+                        Some(false) => drop(flat.insert(name)),
+                        None => {}
+                    }
+                }
+            }
+        }
+        rough.extend(flat.difference(&informed).cloned());
+        any.then_some(rough)
+    }
+
+    /// Whether draws from the prior are impossible, or lie so far below uniform starts in the
+    /// unconstrained space that chains had better begin there.
+    fn lies_far(&self, uniform: impl Fn(u64) -> TraceResult<Trace>) -> bool {
+        let best = |all: &mut dyn Iterator<Item = f64>| all.fold(f64::NEG_INFINITY, f64::max);
+        let prior = best(&mut self.draws.iter().map(free_density));
+        let one = |i: u64| {
+            let mut trace = uniform(i).ok()?;
+            approach(&mut trace, &StepContext::new(0, 0, i)).ok()?;
+            Some((free_density(&trace), trace.choice_count()))
+        };
+        let all: Vec<(f64, usize)> = (0..UNIFORM).filter_map(one).collect();
+        let near = best(&mut all.iter().map(|(d, _)| *d));
+        let most = all.iter().map(|(_, n)| *n).max().unwrap_or(0) as f64;
+        near > f64::NEG_INFINITY && near - prior > FAR.0 + FAR.1 * most
+    }
+
+    /// Whether all finite choices can be summed out on a tape, and that costs little compared
+    /// with a sweep over them.
+    fn sum_pays(&mut self) -> bool {
+        let pays = |trace: &mut Trace| {
+            let moving = of_kind(trace, ChoiceKind::Continuous);
+            let sites = of_kind(trace, ChoiceKind::Finite);
+            if moving.is_empty() || sites.is_empty() {
+                return false;
+            }
+            let recording = trace.record_summed(&moving, &sites, Draws::default()).ok().flatten();
+            recording.is_some_and(|r| {
+                let (sum, sweep) = r.scores();
+                sum <= SUM_PAYS * sweep
+            })
+        };
+        self.draws.iter_mut().all(pays)
+    }
+
+    /// Whether the finite choices can be drawn jointly; with `most`, also whether some depend
+    /// on each other, and the tables have at most that many times as many entries as a sweep
+    /// of `gibbs` evaluates scores.
+    fn is_exact(&mut self, most: Option<usize>) -> bool {
+        let is = |trace: &mut Trace| {
+            let selection = trace.select(&Selector::Kind(ChoiceKind::Finite));
+            let tables = match trace.tabulate(selection, 1.0, Draws::default()) {
+                Ok(Tabulation::Tables(tables)) => tables,
+                _ => return false,
+            };
+            let counts = tables.counts();
+            let sweep = |f: &pcadlang_numerics::elimination::Factor| {
+                f.scope.iter().map(|x| counts[*x]).sum::<usize>()
+            };
+            let sweep: usize = tables.factors.iter().map(sweep).sum();
+            let coupled = tables.factors.iter().any(|f| f.scope.len() > 1);
+            let made = Elimination::new(&counts, &tables.factors, LARGEST);
+            made.is_ok_and(|e| most.is_none_or(|most| coupled && e.entries() <= most * sweep))
+        };
+        self.draws.iter_mut().all(is)
+    }
+}
+
+/// The choices of an address, whatever its keys are.
+fn pattern(address: &Address) -> String {
+    let mut text = String::from("@");
+    for (i, s) in address.segments.iter().enumerate() {
+        let keys = if i + 1 < address.segments.len() { s.keys.len() } else { 0 };
+        let mut name = s.clone();
+        name.keys.clear();
+        text += &format!("{}{name}{}", if i > 0 { "/" } else { "" }, "[*]".repeat(keys));
+    }
+    text
+}
+
+/// Whether the derivative of the likelihood with respect to a choice is not 0; `None` if the
+/// likelihood does not change with it either.
+fn informs(trace: &mut Trace, t: Target) -> Option<bool> {
+    let gradient = |trace: &Trace, power| {
+        let mut g = Vec::new();
+        trace.gradient(&[t], power, &mut g).ok().map(|()| g)
+    };
+    let (with, without) = (gradient(trace, 1.0)?, gradient(trace, 0.0)?);
+    if with != without {
+        return Some(true);
+    }
+    let draws = Draws { key: StreamKey::new(0, 0, Purpose::MIX), step: 0, substream: 0 };
+    let changes = |trace: &mut Trace, substream| {
+        let draws = Draws { substream, ..draws };
+        let changed = trace.propose(&[(t, Change::Resample)], draws);
+        let changed = changed.is_ok_and(|w| w.log_likelihood != 0.0 && !w.log_likelihood.is_nan());
+        trace.rollback();
+        changed
+    };
+    (0..4).any(|i| changes(trace, i)).then_some(false)
 }

@@ -1,7 +1,7 @@
 //! Initial states: traces of positive probability, and an explanation when none is found.
 
 use super::kernel::StepContext;
-use super::kernels::ProgramKernel;
+use super::kernels::{ProgramKernel, approach};
 use pcadlang_engine::lang::address::Address;
 use pcadlang_engine::lang::code::Code;
 use pcadlang_engine::lang::error::RunError;
@@ -16,12 +16,13 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How a chain starts: from the best of a number of draws from the prior, by log joint
-/// density.
+/// How a chain starts: from one of a number of draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Start {
     /// The number of draws of positive probability.
     pub draws: u64,
+    /// Where they come from, and which of them is taken.
+    pub by: By,
     /// How many of the best are kept: with more than one, warm-up begins with a
     /// population that anneals.
     pub keep: usize,
@@ -29,11 +30,26 @@ pub struct Start {
     pub within: Option<Duration>,
 }
 
+/// Where the draws come from that a chain may start with, and which of them is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum By {
+    /// From the prior: with probability proportional to its likelihood.
+    Likelihood,
+    /// From the prior: that of the highest log joint density.
+    Best,
+    /// Uniform in the unconstrained space, followed by a short ascent: with probability
+    /// proportional to its density in that space.
+    Density,
+}
+
 impl Default for Start {
     fn default() -> Self {
-        Start { draws: 1, keep: 1, within: None }
+        Start { draws: 1, keep: 1, by: By::Likelihood, within: None }
     }
 }
+
+/// Half of the width of the interval of uniform starts, as in Stan.
+const SPREAD: f64 = 2.0;
 
 /// How many draws from the prior may have zero probability before that is an error.
 const RETRIES: u64 = 1000;
@@ -123,8 +139,10 @@ pub(crate) fn starts_from(
 ) -> Result<Vec<Trace>, StartError> {
     let mut begun = Instant::now();
     let key = StreamKey::new(seed, chain, Purpose::START);
-    let mut source = Source { code, seed, chain, key, from, limits: &limits, last: None };
-    let mut best: Vec<Trace> = Vec::new();
+    let by = how.by;
+    let mut source = Source { code, seed, chain, key, by, from, limits: &limits, last: None };
+    // With what they are compared by, in descending order.
+    let mut best: Vec<(f64, Trace)> = Vec::new();
     let mut found = 0;
     let mut last = None;
     for attempt in 0..how.draws.saturating_add(RETRIES) {
@@ -138,9 +156,18 @@ pub(crate) fn starts_from(
             Ok(None) => {}
             Ok(Some(t)) if t.log_joint() > f64::NEG_INFINITY => {
                 found += 1;
-                let place = best.partition_point(|b| b.log_joint() >= t.log_joint());
+                let at = StepContext::new(seed, chain, attempt).within(u64::MAX - 2);
+                // The greatest of logs of weights plus Gumbel noise is at an index with
+                // probability proportional to its weight.
+                let noise = -libm::log(-libm::log(at.stream().open_uniform()));
+                let rank = match by {
+                    By::Best => t.log_joint(),
+                    By::Likelihood => t.log_likelihood() + noise,
+                    By::Density => free_density(&t) + noise,
+                };
+                let place = best.partition_point(|(b, _)| *b >= rank);
                 if place < how.keep.max(1) {
-                    best.insert(place, t.into_owned());
+                    best.insert(place, (rank, t.into_owned()));
                     best.truncate(how.keep.max(1));
                 }
             }
@@ -159,7 +186,7 @@ pub(crate) fn starts_from(
         }
     }
     match last {
-        _ if !best.is_empty() => Ok(best),
+        _ if !best.is_empty() => Ok(best.into_iter().map(|(_, t)| t).collect()),
         Some(Ok(t)) => Err(StartError::Impossible(explain(&t))),
         Some(Err(e)) => Err(StartError::Run(e)),
         None => Err(StartError::Impossible(NoStart::default())),
@@ -172,6 +199,7 @@ struct Source<'a> {
     seed: u64,
     chain: u32,
     key: StreamKey,
+    by: By,
     from: Option<&'a ProgramKernel>,
     limits: &'a Limits,
     /// The last draw, of which the next is an update, if the kernel's proposal does not
@@ -183,7 +211,17 @@ impl Source<'_> {
     /// Makes a draw; `None` if the program is undefined where the kernel leads.
     fn draw(&mut self, attempt: u64) -> TraceResult<Option<Cow<'_, Trace>>> {
         let draws = Draws { key: self.key, step: attempt, substream: 0 };
-        let simulate = || Trace::simulate(Arc::clone(self.code), draws, self.limits.clone());
+        let spread = (self.by == By::Density).then_some(SPREAD);
+        let (code, limits) = (self.code, self.limits);
+        let simulate = || {
+            Trace::started(Arc::clone(code), [], spread, draws, limits.clone()).map(|(t, _)| t)
+        };
+        if self.by == By::Density {
+            let mut trace = simulate()?;
+            let at = StepContext::new(self.seed, self.chain, attempt).within(u64::MAX - 3);
+            approach(&mut trace, &at)?;
+            return Ok(Some(Cow::Owned(trace)));
+        }
         let Some(from) = self.from else { return Ok(Some(Cow::Owned(simulate()?))) };
         // Steps of the plan count from 0: this part is distinct from all of them.
         let at = StepContext::new(self.seed, self.chain, attempt).within(u64::MAX - 1);
@@ -200,6 +238,12 @@ impl Source<'_> {
         }
         Ok(Some(Cow::Borrowed(self.last.insert(last))))
     }
+}
+
+/// The log joint density of a state in the unconstrained space.
+pub(crate) fn free_density(trace: &Trace) -> f64 {
+    let jacobian = |t: &Target| trace.free_to_move(*t).map(|(_, jacobian)| jacobian);
+    trace.log_joint() + trace.all_targets().iter().filter_map(jacobian).sum::<f64>()
 }
 
 /// Draws all choices of a trace again, except for those that are given, by an update with the

@@ -16,7 +16,7 @@ use pcadlang_engine::lang::reach::Reach;
 use pcadlang_engine::trace::{Draws, Limits, Trace};
 use pcadlang_inference::draws::Sink;
 use pcadlang_inference::{
-    ChainError, ChainResult, Progress, RunOptions, attempts, default_plan, run_chains,
+    ChainError, ChainResult, Progress, RunOptions, default_plan, run_chains,
 };
 use pcadlang_numerics::platform::clock;
 use pcadlang_numerics::rng::{Purpose, StreamKey};
@@ -25,11 +25,6 @@ use pcadlang_syntax::ast::ItemKind;
 use pcadlang_syntax::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap};
 use pcadlang_syntax::parse;
 use std::sync::Arc;
-
-/// The number of draws from the prior from which a default plan is made.
-const DRAWS_FOR_PLAN: u64 = 10;
-/// The number of draws that are tried if all of those fail.
-const ATTEMPTS_FOR_PLAN: u64 = 1000;
 
 /// A compiled program with its data.
 #[derive(Debug)]
@@ -166,17 +161,8 @@ impl Model {
         if let Some(p) = self.compiled.plans.first() {
             return Ok((Arc::clone(p), None));
         }
-        let drawn = |i| {
-            let draws = Draws { key: StreamKey::new(0, 0, Purpose::START), step: i, substream: 0 };
-            Trace::simulate(Arc::clone(self.code()), draws, self.limits.clone())
-        };
-        let mut draws: Vec<Trace> = (0..DRAWS_FOR_PLAN).filter_map(|i| drawn(i).ok()).collect();
-        if draws.is_empty() {
-            // Draws may fail, e.g. because a standard deviation is negative; the plan is
-            // then made from the first draw that succeeds.
-            draws.push(attempts(ATTEMPTS_FOR_PLAN, drawn).map_err(|e| self.run_error(*e))?);
-        }
-        let text = default_plan(&mut draws);
+        let text =
+            default_plan(self.code(), &self.limits).map_err(|e| self.run_error(*e))?;
         let mut sources = self.sources.clone();
         let file = sources.add("<default plan>", &text);
         let (program, _) = parse(&text, file);

@@ -150,6 +150,11 @@ impl Elimination {
         self.log_sum
     }
 
+    /// The number of entries of all tables.
+    pub fn entries(&self) -> usize {
+        self.steps.iter().map(|s| s.table.len()).sum()
+    }
+
     /// Draws a joint value with probability proportional to its weight, which must be
     /// positive for some: by variable, the index of its value.
     pub fn draw(&self, rng: &mut Stream) -> Vec<usize> {

@@ -48,9 +48,8 @@ pub struct Step {
 /// The kinds of statements.
 #[derive(Clone, Debug)]
 pub enum StepKind {
-    /// `init(best_of(…))`, or `None` for `init(prior())`; only the first one of a block
-    /// counts, before the block runs.
-    Init(Option<BestOf>),
+    /// `init(…)`: only the first one of a block counts, before the block runs.
+    Init(Init),
     /// `anneal(from)`
     Anneal(Formula),
     /// `warmup n { … }`
@@ -109,6 +108,17 @@ impl Step {
     pub fn any(&self, is: &impl Fn(&StepKind) -> bool) -> bool {
         is(&self.kind) || self.body().iter().any(|s| s.any(is))
     }
+}
+
+/// How a chain starts.
+#[derive(Clone, Debug)]
+pub enum Init {
+    /// `prior(n)`, with the number of draws if it is given.
+    Prior(Option<Formula>),
+    /// `uniform(n)`, with the number of restarts if it is given.
+    Uniform(Option<Formula>),
+    /// `best_of(n, keep, from)`
+    BestOf(BestOf),
 }
 
 /// `best_of(n, keep, from)`: how a chain starts.

@@ -81,6 +81,9 @@ pub(crate) struct Graph {
     /// Set while a program runs for the first time: improper choices may then take a
     /// value to start from.
     pub starting: bool,
+    /// If set, continuous choices of the first run are uniform between minus this and this in
+    /// the unconstrained space, instead of drawn from the prior.
+    pub spread: Option<f64>,
     /// Values that choices take when they are first drawn.
     pub constraints: FxHashMap<u64, Constraint>,
     /// Values that replace the program's observed values, by the hash of the
@@ -133,6 +136,7 @@ impl Graph {
             choices: Choices::default(),
             draws: Draws::default(),
             starting: false,
+            spread: None,
             constraints: FxHashMap::default(),
             observed: std::sync::Arc::clone(&code.observed),
             before: None,

@@ -97,8 +97,25 @@ impl Trace {
         draws: Draws,
         limits: Limits,
     ) -> TraceResult<(Self, Weight)> {
+        Trace::started(code, constraints, None, draws, limits)
+    }
+
+    /// As [`Trace::generate`]; with a `spread`, continuous choices that are not given are
+    /// uniform between minus this and this in the unconstrained space.
+    ///
+    /// # Errors
+    /// As [`Trace::generate`].
+    #[doc(hidden)]
+    pub fn started(
+        code: Arc<Code>,
+        constraints: impl IntoIterator<Item = (u64, Constraint)>,
+        spread: Option<f64>,
+        draws: Draws,
+        limits: Limits,
+    ) -> TraceResult<(Self, Weight)> {
         let mut trace = Trace::prior(code, limits);
         let g = &mut trace.graph;
+        g.spread = spread;
         g.constraints = constraints.into_iter().collect();
         g.draws = draws;
         let before = g.begin();
@@ -109,7 +126,7 @@ impl Trace {
         g.effects.extend(effects);
         g.starting = true;
         g.propagate(&trace.code)?;
-        g.starting = false;
+        (g.starting, g.spread) = (false, None);
         let weight = g.weight(&before.prior, &before.likelihood);
         g.commit(&trace.code);
         g.constraints.clear();

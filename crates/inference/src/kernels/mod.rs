@@ -37,6 +37,7 @@ pub use slice::Slice;
 pub use smc::Smc;
 pub use temper::Temper;
 
+pub(crate) use hamiltonian::approach;
 use hamiltonian::{hmc, mala, modes, nuts, optimize};
 use pcadlang_engine::lang::builtins::{Builtin, Table};
 use row::KernelRow;

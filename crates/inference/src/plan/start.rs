@@ -3,15 +3,18 @@
 use crate::calls::build::arguments;
 use crate::calls::error::fail;
 use crate::calls::formula::{PlanEnv, evaluate};
-use crate::init::Start;
+use crate::init::{By, Start};
 use crate::kernels::ProgramKernel;
 use crate::run::{ChainError, RunOptions};
 use pcadlang_engine::lang::code::Code;
 use pcadlang_engine::lang::error::RunError;
-use pcadlang_engine::lang::plan::{BestOf, Callee, Formula, KernelCall, Plan, StepKind};
+use pcadlang_engine::lang::plan::{BestOf, Callee, Formula, Init, KernelCall, Plan, StepKind};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::{Draws, Trace};
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// How many uniform starts a chain compares, if the plan does not say.
+const RESTARTS: u64 = 4;
 
 /// How a chain starts, and the kernel that proposes its states, if any.
 type StartOf = (Start, Option<ProgramKernel>);
@@ -50,15 +53,27 @@ pub(super) fn start_of(
         StepKind::Init(start) => Some(start),
         _ => None,
     });
-    let Some(Some(BestOf { draws, keep, from })) = init else {
-        return Ok((Start::default(), None));
-    };
     let mut trace = Trace::prior(Arc::clone(code), options.limits.clone());
     let mut env = PlanEnv::before(&mut trace, Draws::default());
+    let mut number = |n: &Option<Formula>, otherwise: u64| {
+        n.as_ref().map_or(Ok(otherwise), |f| count(f, &mut env))
+    };
+    let BestOf { draws, keep, from } = match init {
+        None => return Ok((Start::default(), None)),
+        Some(Init::Prior(n)) => {
+            return Ok((Start { draws: number(n, 1)?, ..Start::default() }, None));
+        }
+        Some(Init::Uniform(n)) => {
+            let draws = number(n, RESTARTS)?;
+            return Ok((Start { draws, by: By::Density, ..Start::default() }, None));
+        }
+        Some(Init::BestOf(best)) => best,
+    };
     let draws = count(draws, &mut env)?;
     let keep = keep.as_ref().map_or(Ok(1), |f| count(f, &mut env))?;
     let from = from.as_ref().map(|call| own(plan, call, &mut env)).transpose()?;
-    Ok((Start { draws, keep: keep.min(draws) as usize, within: None }, from))
+    let keep = keep.min(draws) as usize;
+    Ok((Start { draws, keep, by: By::Best, within: None }, from))
 }
 
 fn count(f: &Formula, env: &mut PlanEnv) -> Result<u64, Box<RunError>> {

@@ -112,6 +112,7 @@ pub enum PlanForm {
     Init,
     Anneal,
     Prior,
+    Uniform,
     BestOf,
     Value,
     Elapsed,

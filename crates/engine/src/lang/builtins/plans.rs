@@ -36,13 +36,14 @@ pub(super) const TABLE: &[Row] = &[
         &[SEL],
         Type::Selection,
         "Each of the selected choices in turn, in program order: a sweep with one step per \
-         choice. For mh, gibbs and drift.",
+         choice. The choices may change \
+         from one step to the next.",
     ),
     name(
         PlanForm::Init,
         "init",
         CHOICES,
-        &[arg("start", Type::Kernel, "`prior()` or `best_of(n)`.")],
+        &[arg("start", Type::Kernel, "`prior()`, `best_of(n)` or `uniform()`.")],
         Type::Kernel,
         "Sets how a chain starts; by default, from the prior.",
     ),
@@ -56,7 +57,26 @@ pub(super) const TABLE: &[Row] = &[
          warm-up. If several starts are kept, this is population annealing: they move in turn, \
          and are resampled by their weights.",
     ),
-    name(PlanForm::Prior, "prior", CHOICES, &[], Type::Kernel, "A start drawn from the prior."),
+    name(
+        PlanForm::Prior,
+        "prior",
+        CHOICES,
+        &[opt("n", Type::Int, "1", "The number of draws.")],
+        Type::Kernel,
+        "A start drawn from the prior: one of `n` draws, with probability proportional to its \
+         likelihood, so that chains start apart.",
+    ),
+    name(
+        PlanForm::Uniform,
+        "uniform",
+        CHOICES,
+        &[opt("n", Type::Int, "4", "The number of restarts.")],
+        Type::Kernel,
+        "A start for vague priors, as in Stan: continuous choices are uniform on (-2, 2) in the \
+         unconstrained space, others are drawn from the prior. A few steps of L-BFGS follow \
+         while they gain much. One of `n` such states is taken, with probability proportional \
+         to its density in that space.",
+    ),
     name(
         PlanForm::BestOf,
         "best_of",

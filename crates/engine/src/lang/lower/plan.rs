@@ -6,7 +6,7 @@ use super::types::shown;
 use crate::lang::builtins::{self, Builtin, KernelTraits, Kind, PlanForm, Type};
 use crate::lang::code::Operand;
 use crate::lang::plan::{
-    Argument, BestOf, Callee, Choices, DeclaredKernel, Formula, KernelCall, Path, PathSegment,
+    Argument, BestOf, Callee, Choices, DeclaredKernel, Formula, Init, KernelCall, Path, PathSegment,
     Pick, Plan, Selection, Step, StepKind,
 };
 use pcadlang_syntax::ast::{Arg, Expr, ExprKind, KStmt, KStmtKind, KernelDecl, Param};
@@ -403,25 +403,29 @@ impl Lowerer<'_> {
         let table = Arc::clone(&self.code.builtins);
         let found = call(e).and_then(|(name, args)| Some((self.inference_name(name)?, args)));
         match found {
-            Some(((i, PlanForm::Prior), args)) => self
-                .inference_args(table.get(i), args, e.span, around)
-                .map(|_| StepKind::Init(None)),
-            Some(((i, PlanForm::BestOf), args)) => {
+            Some(((i, form), args))
+                if matches!(form, PlanForm::Prior | PlanForm::Uniform | PlanForm::BestOf) =>
+            {
                 let args = self.inference_args(table.get(i), args, e.span, around)?;
                 let mut args = args.into_iter();
                 let mut value = || match args.next() {
                     Some(Argument::Value(f)) => Some(f),
                     _ => None,
                 };
+                match form {
+                    PlanForm::Prior => return Some(StepKind::Init(Init::Prior(value()))),
+                    PlanForm::Uniform => return Some(StepKind::Init(Init::Uniform(value()))),
+                    _ => {}
+                }
                 let (draws, keep) = (value()?, value());
                 let from = match args.next() {
                     Some(Argument::Kernel(call)) => Some(call),
                     _ => None,
                 };
-                Some(StepKind::Init(Some(BestOf { draws, keep, from })))
+                Some(StepKind::Init(Init::BestOf(BestOf { draws, keep, from })))
             }
             _ => {
-                self.error("`init` takes prior() or best_of(n)", e.span, "not a start").hint_also(
+                self.error("`init` takes prior(), best_of(n) or uniform()", e.span, "not a start").hint_also(
                     "init(best_of(100)); starts at the best of 100 draws from the prior",
                 );
                 None

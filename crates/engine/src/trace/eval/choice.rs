@@ -243,12 +243,21 @@ impl Graph {
         Ok(value)
     }
 
-    /// Draws from the prior.
+    /// Draws from the prior, or in a first run where that is asked for uniformly.
     fn drawn_now(&self, code: &Code, n: NodeId, dist: &Dist, hash: u64) -> Result<Datum, Failure> {
         if dist.is_improper() && !self.starting {
             return Err(self.improper(code, n, dist));
         }
-        Ok(dist.sample_stored(&mut self.draws.stream(hash)))
+        let mut rng = self.draws.stream(hash);
+        if let Some(width) = self.spread {
+            let support = dist.stored_support();
+            if !support.is_discrete() {
+                let free: Vec<f64> =
+                    (0..support.free_dim()).map(|_| width * (2.0 * rng.uniform() - 1.0)).collect();
+                return Ok(support.from_free(&free).0);
+            }
+        }
+        Ok(dist.sample_stored(&mut rng))
     }
 
     fn set_improper(&mut self, n: NodeId, dist: &Dist) {

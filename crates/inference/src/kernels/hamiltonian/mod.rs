@@ -24,3 +24,4 @@ pub use hmc::Hmc;
 pub use kernel::Hamiltonian;
 pub use nuts::Nuts;
 pub use optimize::Optimize;
+pub(crate) use optimize::approach;

@@ -11,7 +11,7 @@ use super::system::System;
 use crate::kernel::{Kernel, Outcome, Registered, SiteSelection, StepContext};
 use crate::kernels::row::{KernelRow, SEL, Type, number, opt};
 use crate::state::{StateError, pack, unpack};
-use pcadlang_engine::trace::{Trace, TraceResult};
+use pcadlang_engine::trace::{ChoiceKind, Selector, Trace, TraceResult};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -135,6 +135,36 @@ pub(super) fn ascend(
         }
     }
     Ok(here)
+}
+
+/// The most steps of a short ascent.
+const FEW: u32 = 10;
+
+/// Climbs a few steps with all continuous choices, while each gains much more than the
+/// density varies within the typical set; a mode may be far from that.
+pub(crate) fn approach(trace: &mut Trace, at: &StepContext) -> TraceResult<()> {
+    let selection = trace.select(&Selector::Kind(ChoiceKind::Continuous));
+    let targets = trace.targets(selection).to_vec();
+    let mut memory = Memory::default();
+    // Where there is no gradient the state stays as it is.
+    let Ok(Some((mut system, begun))) = System::begin(trace, at, &targets, None, &mut memory)
+    else {
+        return Ok(());
+    };
+    let (mut here, mut past) = (Arc::clone(&begun), Past::new());
+    for _ in 0..FEW {
+        let Ok(next) = ascend(&mut system, &here, 1, &mut past) else { break };
+        let gain = next.log_density - here.log_density;
+        here = next;
+        if gain < 10.0 + here.y.len() as f64 {
+            break;
+        }
+    }
+    let moved = here.log_density > begun.log_density && system.finish_at(Some(&here))?;
+    if !moved {
+        trace.rollback();
+    }
+    Ok(())
 }
 
 impl Kernel for Optimize {
