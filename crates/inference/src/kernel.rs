@@ -69,6 +69,9 @@ pub struct Outcome {
     pub failed: u32,
     /// Divergent trajectories: those with a very large energy error.
     pub divergent: u32,
+    /// Proposals of single-site kernels that led, or could have led, to another state of
+    /// positive probability.
+    pub possible: u32,
     /// The choice that the step was about, for single-site kernels.
     #[serde(skip)]
     pub site: Option<Target>,
@@ -87,6 +90,7 @@ impl Outcome {
         add(&mut self.accepted, other.accepted);
         add(&mut self.failed, other.failed);
         add(&mut self.divergent, other.divergent);
+        add(&mut self.possible, other.possible);
     }
 
     /// The same outcome, attributed to one choice.
@@ -359,7 +363,8 @@ pub(crate) fn accept_or_reject(trace: &mut Trace, log_ratio: f64, rng: &mut Stre
     } else {
         trace.rollback()
     }
-    Outcome::one(accepted)
+    let possible = u32::from(log_ratio > f64::NEG_INFINITY);
+    Outcome { possible, ..Outcome::one(accepted) }
 }
 
 /// Separates proposals at which the program is undefined (`None`) from failures of the

@@ -25,6 +25,7 @@ impl Sites {
         let site = self.0.entry(hash).or_insert_with(new);
         site.proposals = site.proposals.saturating_add(outcome.proposals.into());
         site.accepted = site.accepted.saturating_add(outcome.accepted.into());
+        site.possible = site.possible.saturating_add(outcome.possible.into());
     }
 
     /// The counts, for a checkpoint.

@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// The least number of proposals from which a choice is judged.
+pub(super) const JUDGED: u64 = 100;
+
 /// Statistics of a kernel in a chain, or in all of them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct KernelStats {
@@ -18,6 +21,10 @@ pub struct KernelStats {
     /// Divergent trajectories (Hamiltonian kernels).
     #[serde(default)]
     pub divergent: u64,
+    /// Proposals that led, or could have led, to another state of positive probability
+    /// (single-site kernels).
+    #[serde(default)]
+    pub possible: u64,
     /// The step size after warm-up (Hamiltonian kernels); over several chains, the mean.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub step_size: Option<f64>,
@@ -36,6 +43,9 @@ pub struct SiteStats {
     pub proposals: u64,
     /// Those accepted.
     pub accepted: u64,
+    /// Those that led, or could have led, to another state of positive probability.
+    #[serde(default)]
+    pub possible: u64,
 }
 
 impl SiteStats {
@@ -52,8 +62,14 @@ impl SiteStats {
             let t = sum.entry(&s.address).or_insert_with(new);
             t.proposals += s.proposals;
             t.accepted += s.accepted;
+            t.possible += s.possible;
         }
         sum.into_values().collect()
+    }
+
+    /// Whether the choice never moved, although other values of it are possible.
+    pub fn is_stuck(&self) -> bool {
+        self.proposals >= JUDGED && self.accepted == 0 && self.possible > 0
     }
 }
 
@@ -66,6 +82,7 @@ impl KernelStats {
         add(&mut self.accepted, outcome.accepted);
         add(&mut self.failed, outcome.failed);
         add(&mut self.divergent, outcome.divergent);
+        add(&mut self.possible, outcome.possible);
         self.seconds += time.as_secs_f64();
     }
 
@@ -89,6 +106,7 @@ impl KernelStats {
             t.seconds += s.seconds;
             t.failed += s.failed;
             t.divergent += s.divergent;
+            t.possible += s.possible;
         }
         for t in sum.values_mut() {
             let same = all.iter().filter(|s| s.name == t.name);

@@ -2,10 +2,9 @@
 //! moved.
 
 use super::draws::SiteStats;
+use super::stats::JUDGED;
 use pcadlang_engine::trace::{Effect, Trace};
 
-/// The least number of proposals from which a choice is judged.
-const JUDGED: u64 = 100;
 /// The acceptance rate from which a choice counts as moving.
 const MOVES: f64 = 0.01;
 

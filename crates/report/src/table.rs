@@ -202,6 +202,7 @@ drift(one(@**))          0         -       1  0.50 s
             address: address.into(),
             proposals: 100,
             accepted,
+            ..Default::default()
         };
         assert_eq!(sites(&[site("@x", 5)]), "");
         let text = sites(&[site("@x", 50), site("@y", 5)]);

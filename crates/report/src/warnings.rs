@@ -72,6 +72,13 @@ pub fn warnings(
                  a longer warm-up, or adding `drift` to the mix, may also help",
                 k.name, k.divergent, k.proposals
             ));
+        } else if k.accepted == 0 && k.possible > 0 {
+            out.push(format!(
+                "{} accepted none of {} proposals, although other values are possible: the chains \
+                 may not be able to leave the modes in which they began; draw choices that depend \
+                 on each other together, with exact($finite) or block(…)",
+                k.name, k.proposals
+            ));
         } else if k.accepted == 0 {
             out.push(format!(
                 "{} accepted none of {} proposals, so it only costs time",

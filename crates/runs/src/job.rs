@@ -396,6 +396,7 @@ fn fill(
     let approximate = approximate(job, &chains);
     let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
     warnings.extend(chains.first().and_then(|c| structure_warning(&c.last, &sites)));
+    warnings.extend(stuck_warning(&sites));
     let inputs = image.as_ref().map(|(name, _)| name.as_str()).zip(ready.image());
     let located = chains.first().map_or_else(Vec::new, |c| c.last.located());
     warnings.extend(seen::warnings(inputs, job.keypoints.as_deref(), &located));
@@ -452,6 +453,19 @@ fn structure_warning(state: &pcadlang_engine::trace::Trace, sites: &[SiteStats])
          the number of components hardly changes; marginalise their labels, as in `observe mixture(map(fn(m) {{ 1 / k }}, mu), \
          map(fn(m) {{ normal(m, sd) }}, mu)) = ys;` (guide, chapter 7)",
         100.0 * rate
+    ))
+}
+
+/// Warns of choices that never moved in any chain, although other values of them are possible.
+fn stuck_warning(sites: &[SiteStats]) -> Option<String> {
+    let stuck: Vec<&SiteStats> = sites.iter().filter(|s| s.is_stuck()).collect();
+    let more =
+        if stuck.len() > 1 { format!(" (and {} others)", stuck.len() - 1) } else { String::new() };
+    Some(format!(
+        "{}{more} never moved in any chain, although other values are possible: the chains may not \
+         be able to leave the modes in which they began; draw choices that depend on each other \
+         together, with exact($finite) or block(…)",
+        stuck.first()?.address
     ))
 }
 

@@ -139,8 +139,11 @@ impl Kernel for Gibbs {
             None => self.weigh(trace, at, target, old, (libm::log(n as f64), 0))?,
         };
         let chosen = sample_log(&self.log, &mut self.weights, &mut rng);
+        let other = |(i, l): (usize, &f64)| i != old && *l > f64::NEG_INFINITY;
+        let possible = u32::from(self.log.iter().enumerate().any(other));
+        let failed = forward.failed;
         let mut outcome =
-            Outcome { proposals: 1, failed: forward.failed, ..Default::default() }.at(target);
+            Outcome { proposals: 1, failed, possible, ..Default::default() }.at(target);
         if chosen == old {
             trace.rollback();
             return Ok(outcome);
