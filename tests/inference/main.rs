@@ -10,6 +10,7 @@ mod balance;
 mod calibration;
 mod chains;
 mod circle;
+mod default_plan;
 mod enumeration;
 mod exact;
 mod gathered;

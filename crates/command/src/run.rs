@@ -103,6 +103,9 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explan
              its scale (a pseudo-posterior)",
         );
     }
+    if o.chains.iter().all(|c| !c.last.is_conditioned()) {
+        paragraph("note: nothing is observed, so these are draws from the prior");
+    }
     if o.every > 1 {
         print_line!(
             "note: the summary is thinned to one draw in {}; the chain files have all draws",

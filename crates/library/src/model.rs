@@ -24,7 +24,7 @@ use pcadlang_report::{ChainDraws, Memory, Quantity, quantities};
 use pcadlang_syntax::ast::ItemKind;
 use pcadlang_syntax::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap};
 use pcadlang_syntax::parse;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A compiled program with its data.
 #[derive(Debug)]
@@ -36,6 +36,8 @@ pub struct Model {
     data_hash: String,
     reach: Reach,
     limits: Limits,
+    /// The default plan and its text, once they have been made.
+    default_plan: OnceLock<(Arc<Plan>, String)>,
 }
 
 impl Model {
@@ -161,8 +163,11 @@ impl Model {
         if let Some(p) = self.compiled.plans.first() {
             return Ok((Arc::clone(p), None));
         }
-        let text =
-            default_plan(self.code(), &self.limits).map_err(|e| self.run_error(*e))?;
+        let made = |(plan, text): &(Arc<Plan>, String)| (Arc::clone(plan), Some(text.clone()));
+        if let Some(known) = self.default_plan.get() {
+            return Ok(made(known));
+        }
+        let text = default_plan(self.code(), &self.limits).map_err(|e| self.run_error(*e))?;
         let mut sources = self.sources.clone();
         let file = sources.add("<default plan>", &text);
         let (program, _) = parse(&text, file);
@@ -171,7 +176,7 @@ impl Model {
             _ => None,
         });
         let plan = compile_plan(Arc::clone(&self.code().builtins), &body.unwrap_or_default());
-        Ok((Arc::new(plan), Some(text)))
+        Ok(made(self.default_plan.get_or_init(|| (Arc::new(plan), text))))
     }
 
     /// Runs chains and keeps their draws in memory. The draws depend on the seed, but not

@@ -147,6 +147,12 @@ impl Trace {
         self.all_targets().len()
     }
 
+    /// Whether the state has observations or factors; otherwise draws are those of the prior.
+    #[doc(hidden)]
+    pub fn is_conditioned(&self) -> bool {
+        self.scored_nodes().next().is_some()
+    }
+
     /// Returns named points of the scene at the positions that the observations give them
     /// (see [`crate::lang::value::Likelihood::located`]).
     pub fn located(&self) -> Vec<Located> {

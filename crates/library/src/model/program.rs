@@ -17,7 +17,7 @@ use pcadlang_syntax::diag::{Diagnostic, Severity, SourceMap};
 use rustc_hash::FxHashMap;
 use std::cell::RefCell;
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// The data files that a program has read, with their hashes, by kind, path and reading
 /// options.
@@ -321,6 +321,7 @@ impl Program {
                     data_hash,
                     reach,
                     limits,
+                    default_plan: OnceLock::new(),
                 })
             }
             Err(diagnostics) => Err(Error { diagnostics, sources: self.sources }),
