@@ -53,7 +53,8 @@ fn choices_that_some_states_do_not_read() {
          assume y2 ~ normal(y, 1); assume z2 ~ normal(z, 2);
          observe flip(if a { 0.2 } else { 0.9 }) = true as c;";
     let d = run(text, 1, 4);
-    let (p, q) = (0.2 * normal_pdf(1.0, 0.0, 1.25f64.sqrt()), 0.9 * normal_pdf(1.0, 0.0, 4.25f64.sqrt()));
+    let (p, q) =
+        (0.2 * normal_pdf(1.0, 0.0, 1.25f64.sqrt()), 0.9 * normal_pdf(1.0, 0.0, 4.25f64.sqrt()));
     let a = p / (p + q);
     assert_mean("a", &d["a"], a, 0.06);
     for (name, mean) in [("y", a * 0.8), ("y2", a * 0.8)] {
@@ -72,9 +73,8 @@ fn sweeps_follow_choices_that_appear_and_vanish() {
         let rate = 1.0 + f64::from(g);
         0.6f64.powi(g) * rate.powi(3) * (-rate).exp()
     };
-    let (total, sum) = (0..80).fold((0.0, 0.0), |(t, s), g| {
-        (t + weight(g), s + f64::from(g) * weight(g))
-    });
+    let (total, sum) =
+        (0..80).fold((0.0, 0.0), |(t, s), g| (t + weight(g), s + f64::from(g) * weight(g)));
     for kernel in [
         "mh(each(@**))",
         "gibbs(each($finite))",
@@ -156,10 +156,11 @@ fn exact_draws_of_choices_that_not_all_values_need() {
 #[test]
 fn a_long_hidden_chain_is_drawn_exactly() {
     let (n, k) = (1000, 8);
-    let y: Vec<f64> = (0..n).map(|i| ((i / 9) % k) as f64 + 0.3 * ((i * 31) % 7) as f64 - 0.9).collect();
+    let y: Vec<f64> =
+        (0..n).map(|i| ((i / 9) % k) as f64 + 0.3 * ((i * 31) % 7) as f64 - 0.9).collect();
     let text = format!(
         "let y = {y:?};
-         let T = for i in 0 .. 8 {{ for j in 0 .. 8 {{ if i == j {{ 0.86 }} else {{ 0.02 }} }} }};
+         let T = map(fn(i) {{ map(fn(j) {{ if i == j {{ 0.86 }} else {{ 0.02 }} }}, 0 .. 8) }}, 0 .. 8);
          for t in 0 .. 1000 {{
            z[t] ~ categorical(if t == 0 {{ [1, 1, 1, 1, 1, 1, 1, 1] }} else {{ T[z[t - 1]] }});
            observe normal(z[t], 1) = y[t] as y;
@@ -188,4 +189,49 @@ fn a_long_hidden_chain_is_drawn_exactly() {
     let d = run(&text, 6, 1);
     let name = d.keys().find(|k| k.contains('z')).cloned().unwrap_or_default();
     assert_mean("z[500]", &d[&name], mean, 0.15);
+}
+
+/// No draw from the prior satisfies all conditions: the start is drawn given them.
+#[test]
+fn a_start_that_no_draw_from_the_prior_hits() {
+    let text = "for i in 0 .. 60 { z[i] ~ flip(0.5); }
+         for i in 0 .. 59 { observe flip(if z[i] == z[i + 1] { 1 } else { 0 }) = true as y; }
+         assume first = z[0]; assume last = z[59];";
+    let d = run(text, 7, 2);
+    assert_mean("first", &d["first"], 0.5, 0.06);
+    assert_eq!(d["first"], d["last"]);
+}
+
+/// Priors as vague as those of BUGS: draws from them overflow or lie far from the data.
+#[test]
+fn vague_priors_start_and_agree_with_quadrature() {
+    let text = "let y = [4.1, 5.3, 4.8, 5.9, 5.1, 4.4, 5.6, 5.0, 4.7, 5.2];
+         assume mu ~ normal(0, 1000);
+         assume tau ~ gamma(0.001, 0.001);
+         observe normal(mu, 1 / sqrt(tau)) = y as y;";
+    let y = [4.1, 5.3, 4.8, 5.9, 5.1, 4.4, 5.6, 5.0, 4.7, 5.2];
+    let squares: f64 = y.iter().map(|y| (y - 5.01f64).powi(2)).sum();
+    let d = run(text, 1, 4);
+    assert_mean("mu", &d["mu"], 5.01, 0.05);
+    // With mu integrated out, tau ~ gamma(0.001 + 9/2, 0.001 + squares/2).
+    assert_mean("tau", &d["tau"], 4.501 / (0.001 + squares / 2.0), 0.4);
+}
+
+/// The data say what a step function of a choice is, and its derivative says nothing.
+#[test]
+fn choices_without_a_derivative_are_moved_by_slice() {
+    let text = "assume x ~ normal(0, 2); assume m ~ normal(0, 1);
+         observe normal(floor(x), 0.3) = 1 as y; observe normal(m, 1) = 1 as z;";
+    let model = pcadlang::Model::from_text(text).unwrap();
+    let plan = model.plan().unwrap().1.unwrap();
+    assert!(plan.contains("nuts($continuous - @x); slice(each(@x));"), "{plan}");
+    let weight = |x: f64| normal_pdf(x, 0.0, 2.0) * normal_pdf(x.floor(), 1.0, 0.3);
+    // The step function has its steps at the ends of intervals.
+    let sum = |f: &dyn Fn(f64) -> f64| -> f64 {
+        (-8..8).map(|i| integrate(f, f64::from(i), f64::from(i + 1) - 1e-12, 200)).sum()
+    };
+    let mean = sum(&|x| x * weight(x)) / sum(&weight);
+    let d = run(text, 2, 4);
+    assert_mean("x", &d["x"], mean, 0.1);
+    assert_mean("m", &d["m"], 0.5, 0.1);
 }

@@ -9,7 +9,7 @@ use pcadlang_engine::lang::code::Code;
 use pcadlang_engine::trace::{
     Change, ChoiceKind, Draws, Limits, Selector, Tabulation, Target, Trace, TraceResult,
 };
-use pcadlang_numerics::elimination::Elimination;
+use pcadlang_numerics::elimination::{Elimination, Factor};
 use pcadlang_numerics::rng::{Purpose, StreamKey};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -34,6 +34,10 @@ const UNIFORM: u64 = 3;
 /// Draws from the prior lie far below if it is by more nats than this, and by more than this
 /// many per coordinate.
 const FAR: (f64, f64) = (100.0, 20.0);
+/// The most selections that `slice` has by name; with more it moves all continuous choices.
+const NAMED: usize = 4;
+/// The number of draws whose finite choices are tabulated.
+const FEW_DRAWS: usize = 3;
 /// The most choices that are examined one by one.
 const FEW: usize = 50;
 
@@ -70,12 +74,15 @@ pub fn default_plan(code: &Arc<Code>, limits: &Limits) -> TraceResult<String> {
     let finite = program.count(ChoiceKind::Finite);
     let rough = program.rough();
     let smooth = continuous > 0 && rough.as_ref().is_some_and(|r| r.len() < continuous);
+    let joint = if finite > 0 { program.exactly() } else { None };
+    // Exact draws of all choices do not depend on where they begin.
+    let independent = joint.is_some() && finite == continuous + discrete;
     let mut lines = Vec::new();
     let far = continuous > 0 && program.lies_far(uniform);
     if far {
         lines.push("  // Draws from the prior are impossible, or far from the data.".to_owned());
         lines.push("  init(uniform());".to_owned());
-    } else if finite < continuous + discrete || !program.is_exact(None) {
+    } else if !independent {
         lines.push("  init(prior(20));".to_owned());
     }
     let mut pass = Vec::new();
@@ -90,7 +97,9 @@ pub fn default_plan(code: &Arc<Code>, limits: &Limits) -> TraceResult<String> {
             pass.push(format!("nuts($continuous{minus});"));
         }
         if !rough.is_empty() {
-            lines.push("  // The derivative of the density says nothing about what `slice` moves.".into());
+            lines.push(
+                "  // The derivative of the density says nothing about what `slice` moves.".into(),
+            );
             let rough: Vec<String> = rough.into_iter().collect();
             pass.push(format!("slice(each({}));", rough.join(" + ")));
         }
@@ -110,11 +119,8 @@ pub fn default_plan(code: &Arc<Code>, limits: &Limits) -> TraceResult<String> {
             pass.push("mh(each($continuous));".to_owned());
         }
     }
-    let mut moves = !pass.is_empty() || discrete > finite;
     if left {
-        let most = moves.then_some(EXACT_PAYS);
-        let exact = program.is_exact(most);
-        moves |= !exact;
+        let exact = joint.is_some_and(|j| independent || j.pays());
         pass.push(if exact { "exact($finite);" } else { "gibbs(each($finite));" }.to_owned());
     }
     if discrete > finite {
@@ -122,8 +128,7 @@ pub fn default_plan(code: &Arc<Code>, limits: &Limits) -> TraceResult<String> {
         pass.push("drift(each($discrete - $finite));".to_owned());
     }
     let pass = pass.join(" ");
-    // Draws that are exact do not depend on where they begin.
-    if moves {
+    if !independent {
         lines.push(format!("  warmup 1000 {{ {pass} }}"));
     }
     lines.push(format!("  repeat 1000 {{ {pass} }}"));
@@ -186,7 +191,7 @@ impl Program {
             }
         }
         rough.extend(flat.difference(&informed).cloned());
-        any.then_some(rough)
+        (any && rough.len() <= NAMED).then_some(rough)
     }
 
     /// Whether draws from the prior are impossible, or lie so far below uniform starts in the
@@ -223,26 +228,45 @@ impl Program {
         self.draws.iter_mut().all(pays)
     }
 
-    /// Whether the finite choices can be drawn jointly; with `most`, also whether some depend
-    /// on each other, and the tables have at most that many times as many entries as a sweep
-    /// of `gibbs` evaluates scores.
-    fn is_exact(&mut self, most: Option<usize>) -> bool {
-        let is = |trace: &mut Trace| {
+    /// How the finite choices can be drawn jointly; `None` if they cannot.
+    fn exactly(&mut self) -> Option<Joint> {
+        let mut joint = Joint::default();
+        // The states of one draw show all values, unless they depend on other choices.
+        let others = self.count(ChoiceKind::Continuous) + self.count(ChoiceKind::Discrete)
+            - self.count(ChoiceKind::Finite);
+        let draws = if others == 0 { 1 } else { FEW_DRAWS };
+        for trace in self.draws.iter_mut().take(draws) {
             let selection = trace.select(&Selector::Kind(ChoiceKind::Finite));
             let tables = match trace.tabulate(selection, 1.0, Draws::default()) {
                 Ok(Tabulation::Tables(tables)) => tables,
-                _ => return false,
+                _ => return None,
             };
             let counts = tables.counts();
-            let sweep = |f: &pcadlang_numerics::elimination::Factor| {
-                f.scope.iter().map(|x| counts[*x]).sum::<usize>()
-            };
-            let sweep: usize = tables.factors.iter().map(sweep).sum();
-            let coupled = tables.factors.iter().any(|f| f.scope.len() > 1);
-            let made = Elimination::new(&counts, &tables.factors, LARGEST);
-            made.is_ok_and(|e| most.is_none_or(|most| coupled && e.entries() <= most * sweep))
-        };
-        self.draws.iter_mut().all(is)
+            let made = Elimination::new(&counts, &tables.factors, LARGEST).ok()?;
+            let sweep = |f: &Factor| f.scope.iter().map(|x| counts[*x]).sum::<usize>();
+            joint.entries = joint.entries.max(made.entries());
+            joint.sweep = joint.sweep.max(tables.factors.iter().map(sweep).sum());
+            joint.coupled |= tables.factors.iter().any(|f| f.scope.len() > 1);
+        }
+        Some(joint)
+    }
+}
+
+/// What an exact draw of all finite choices costs.
+#[derive(Default)]
+struct Joint {
+    /// The entries of all tables.
+    entries: usize,
+    /// The scores that a sweep of `gibbs` evaluates.
+    sweep: usize,
+    /// Whether choices depend on each other.
+    coupled: bool,
+}
+
+impl Joint {
+    /// Whether it is worth while each time that other choices have moved.
+    fn pays(&self) -> bool {
+        self.coupled && self.entries <= EXACT_PAYS * self.sweep
     }
 }
 

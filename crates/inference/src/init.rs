@@ -1,12 +1,14 @@
 //! Initial states: traces of positive probability, and an explanation when none is found.
 
-use super::kernel::StepContext;
-use super::kernels::{ProgramKernel, approach};
+use super::kernel::{Kernel, StepContext};
+use super::kernels::{Exact, ProgramKernel, approach};
 use pcadlang_engine::lang::address::Address;
 use pcadlang_engine::lang::code::Code;
 use pcadlang_engine::lang::error::RunError;
 use pcadlang_engine::lang::value::Value;
-use pcadlang_engine::trace::{Change, Constraint, Draws, Limits, Target, Trace, TraceResult};
+use pcadlang_engine::trace::{
+    Change, ChoiceKind, Constraint, Draws, Limits, Selector, Target, Trace, TraceResult,
+};
 use pcadlang_numerics::platform::clock::Instant;
 use pcadlang_numerics::rng::{Purpose, StreamKey};
 use pcadlang_syntax::span::Span;
@@ -187,7 +189,15 @@ pub(crate) fn starts_from(
     }
     match last {
         _ if !best.is_empty() => Ok(best.into_iter().map(|(_, t)| t).collect()),
-        Some(Ok(t)) => Err(StartError::Impossible(explain(&t))),
+        Some(Ok(mut t)) => {
+            // Finite choices can be drawn given the data, however unlikely that is by chance.
+            let at = StepContext::new(seed, chain, u64::MAX);
+            let drawn = Exact::new(Selector::Kind(ChoiceKind::Finite)).step(&mut t, &at);
+            match drawn.is_ok() && t.log_joint() > f64::NEG_INFINITY {
+                true => Ok(vec![t]),
+                false => Err(StartError::Impossible(explain(&t))),
+            }
+        }
         Some(Err(e)) => Err(StartError::Run(e)),
         None => Err(StartError::Impossible(NoStart::default())),
     }
@@ -213,9 +223,8 @@ impl Source<'_> {
         let draws = Draws { key: self.key, step: attempt, substream: 0 };
         let spread = (self.by == By::Density).then_some(SPREAD);
         let (code, limits) = (self.code, self.limits);
-        let simulate = || {
-            Trace::started(Arc::clone(code), [], spread, draws, limits.clone()).map(|(t, _)| t)
-        };
+        let simulate =
+            || Trace::started(Arc::clone(code), [], spread, draws, limits.clone()).map(|(t, _)| t);
         if self.by == By::Density {
             let mut trace = simulate()?;
             let at = StepContext::new(self.seed, self.chain, attempt).within(u64::MAX - 3);

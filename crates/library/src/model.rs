@@ -15,9 +15,7 @@ use pcadlang_engine::lang::plan::Plan;
 use pcadlang_engine::lang::reach::Reach;
 use pcadlang_engine::trace::{Draws, Limits, Trace};
 use pcadlang_inference::draws::Sink;
-use pcadlang_inference::{
-    ChainError, ChainResult, Progress, RunOptions, default_plan, run_chains,
-};
+use pcadlang_inference::{ChainError, ChainResult, Progress, RunOptions, default_plan, run_chains};
 use pcadlang_numerics::platform::clock;
 use pcadlang_numerics::rng::{Purpose, StreamKey};
 use pcadlang_report::{ChainDraws, Memory, Quantity, quantities};

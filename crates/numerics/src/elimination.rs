@@ -95,9 +95,10 @@ fn missing(near: &[BTreeSet<usize>], x: usize) -> usize {
         return near[x].len().pow(2);
     }
     let others: Vec<usize> = near[x].iter().copied().collect();
-    let pairs = others.iter().enumerate().map(|(i, y)| {
-        others[i + 1..].iter().filter(|z| !near[*y].contains(z)).count()
-    });
+    let pairs = others
+        .iter()
+        .enumerate()
+        .map(|(i, y)| others[i + 1..].iter().filter(|z| !near[*y].contains(z)).count());
     pairs.sum()
 }
 
@@ -228,9 +229,8 @@ mod tests {
     }
 
     fn weight(counts: &[usize], factors: &[Factor], values: &[usize]) -> f64 {
-        let one = |f: &Factor| {
-            f.table[f.scope.iter().rev().fold(0, |p, x| p * counts[*x] + values[*x])]
-        };
+        let one =
+            |f: &Factor| f.table[f.scope.iter().rev().fold(0, |p, x| p * counts[*x] + values[*x])];
         factors.iter().map(one).sum()
     }
 
@@ -276,7 +276,8 @@ mod tests {
     /// A grid of 10 x 10 has tables of at most 2^11 entries; a complete graph is refused.
     #[test]
     fn a_grid_is_eliminated_and_a_complete_graph_is_refused() {
-        let pair = |a: usize, b: usize| Factor { scope: vec![a, b], table: vec![1.0, 0.0, 0.0, 1.0] };
+        let pair =
+            |a: usize, b: usize| Factor { scope: vec![a, b], table: vec![1.0, 0.0, 0.0, 1.0] };
         let at = |r: usize, c: usize| 10 * r + c;
         let mut grid = Vec::new();
         for r in 0..10 {

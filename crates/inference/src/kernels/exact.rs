@@ -91,14 +91,8 @@ impl Exact {
         };
         let elimination = Elimination::new(&tables.counts(), &tables.factors, LARGEST)
             .map_err(|e| too_large(trace, selection, e))?;
-        self.last = Some(Last {
-            trace: identity,
-            observed,
-            power: at.power,
-            others,
-            tables,
-            elimination,
-        });
+        self.last =
+            Some(Last { trace: identity, observed, power: at.power, others, tables, elimination });
         Ok(true)
     }
 

@@ -6,8 +6,8 @@ use super::types::shown;
 use crate::lang::builtins::{self, Builtin, KernelTraits, Kind, PlanForm, Type};
 use crate::lang::code::Operand;
 use crate::lang::plan::{
-    Argument, BestOf, Callee, Choices, DeclaredKernel, Formula, Init, KernelCall, Path, PathSegment,
-    Pick, Plan, Selection, Step, StepKind,
+    Argument, BestOf, Callee, Choices, DeclaredKernel, Formula, Init, KernelCall, Path,
+    PathSegment, Pick, Plan, Selection, Step, StepKind,
 };
 use pcadlang_syntax::ast::{Arg, Expr, ExprKind, KStmt, KStmtKind, KernelDecl, Param};
 use pcadlang_syntax::print_expr;
@@ -425,9 +425,10 @@ impl Lowerer<'_> {
                 Some(StepKind::Init(Init::BestOf(BestOf { draws, keep, from })))
             }
             _ => {
-                self.error("`init` takes prior(), best_of(n) or uniform()", e.span, "not a start").hint_also(
-                    "init(best_of(100)); starts at the best of 100 draws from the prior",
-                );
+                self.error("`init` takes prior(), best_of(n) or uniform()", e.span, "not a start")
+                    .hint_also(
+                        "init(best_of(100)); starts at the best of 100 draws from the prior",
+                    );
                 None
             }
         }

@@ -109,6 +109,8 @@ pub(super) struct Found {
     pub asked: Vec<NodeId>,
     /// Whether what is read depends on choices that the kernel moves.
     pub structure_moves: bool,
+    /// Whether what is read, or which nodes exist, depends on choices that are summed out.
+    pub structure_varies: bool,
     /// Whether the distributions of choices that are summed out depend on choices that
     /// the kernel moves.
     pub values_move: bool,
@@ -280,15 +282,21 @@ impl<'a> Reader<'a> {
     /// Returns what the value of a node depends on, given what its inputs depend on.
     fn ended(&mut self, n: NodeId, read: Label) -> Label {
         if !matches!(self.graph.op(self.code, n), Op::Draw { .. }) {
-            if read.moves && !self.found.structure_moves {
-                self.found.structure_moves = self.decided(n).moves;
+            let open = read.moves && !self.found.structure_moves
+                || read.site != NONE && !self.found.structure_varies;
+            if open {
+                let decided = self.decided(n);
+                self.found.structure_moves |= decided.moves;
+                self.found.structure_varies |= decided.site != NONE;
             }
             return read;
         }
         let own = self.own.get(&n).copied().unwrap_or(NOTHING);
         self.found.asked.push(n);
         self.found.values_move |= own.site != NONE && read.moves;
-        self.found.structure_moves |= self.decided(n).moves;
+        let decided = self.decided(n);
+        self.found.structure_moves |= decided.moves;
+        self.found.structure_varies |= decided.site != NONE;
         let score = self.join(own, read);
         if score.site != NONE {
             self.found.scores.push((n, score.site));
@@ -354,6 +362,7 @@ impl<'a> Reader<'a> {
             owner = self.graph.frames[self.graph.nodes[owner as usize].frame as usize].owner;
         }
         self.found.structure_moves |= label.moves;
+        self.found.structure_varies |= label.site != NONE;
         (label, outermost)
     }
 }

@@ -28,6 +28,8 @@ pub(super) struct Sites {
     colours: Vec<usize>,
     /// By factor: the choices that it depends on, in ascending order.
     pub scopes: BTreeMap<NodeId, Vec<usize>>,
+    /// Whether what is read is known to be the same in all states.
+    pub same: bool,
 }
 
 /// Why not all states can be visited.
@@ -47,7 +49,7 @@ pub(super) struct Visited<'a> {
     pub first: bool,
     /// The index of each choice's value.
     pub indices: &'a [usize],
-    /// All choices of the trace.
+    /// All choices of the trace; none if what is read is the same as in the state before.
     pub choices: &'a [NodeId],
     /// Through which of their values the choices determine each node, if that was asked for.
     pub given: &'a FxHashMap<NodeId, Option<Given>>,
@@ -55,7 +57,11 @@ pub(super) struct Visited<'a> {
 
 impl Trace {
     /// The choices of `sites` with their values, for a kernel that moves those of `targets`.
-    pub(super) fn sites(&self, targets: &[Target], sites: &[Target]) -> Result<Sites, &'static str> {
+    pub(super) fn sites(
+        &self,
+        targets: &[Target],
+        sites: &[Target],
+    ) -> Result<Sites, &'static str> {
         let mut own: FxHashMap<NodeId, Label> = FxHashMap::default();
         own.extend(targets.iter().map(|t| (t.node, Label { site: NONE, moves: true, set: 0 })));
         let (mut values, mut supports) = (Vec::new(), Vec::new());
@@ -73,7 +79,8 @@ impl Trace {
             supports.push(support);
         }
         let (colours, scopes) = (vec![0; sites.len()], BTreeMap::new());
-        Ok(Sites { targets: sites.to_vec(), values, supports, own, colours, scopes })
+        let targets = sites.to_vec();
+        Ok(Sites { targets, values, supports, own, colours, scopes, same: false })
     }
 
     /// Brings the trace into at most `most` states in which all entries of all factors occur,
@@ -92,9 +99,15 @@ impl Trace {
             let states = states.filter(|n| *n <= most);
             let states = states.ok_or(Halt::Cannot("too many choices depend on each other"))?;
             let mut known = true;
+            let nothing = FxHashMap::default();
             for state in 0..states {
                 let indices = sites.indices(&counts, state);
                 self.go_to(sites, &indices, draws)?;
+                if known && sites.same && state > 0 && !with_given {
+                    let (first, indices) = (false, &indices[..]);
+                    at(self, sites, Visited { first, indices, choices: &[], given: &nothing })?;
+                    continue;
+                }
                 let mut partition = Partition::default();
                 partition.grow(sites.targets.len());
                 let choices: Vec<NodeId> = self.all_targets().iter().map(|t| t.node).collect();
@@ -110,8 +123,12 @@ impl Trace {
                 if found.anywhere || found.unclear {
                     return Err(Halt::Cannot("observations are made in a `mem` function"));
                 }
+                sites.same = !found.structure_varies;
                 known &= !widen(&mut sites.scopes, &found.factors, sets);
                 if !known {
+                    if sites.same {
+                        break;
+                    }
                     continue;
                 }
                 let given = if with_given { reader.given(&indices) } else { FxHashMap::default() };
@@ -126,8 +143,10 @@ impl Trace {
 
     /// Gives the choices their values in a state.
     fn go_to(&mut self, sites: &Sites, indices: &[usize], draws: Draws) -> Result<(), Halt> {
-        let values = sites.values.iter().zip(indices).map(|(v, i)| Change::Set(v[*i].clone()));
-        let changes: Vec<_> = sites.targets.iter().copied().zip(values).collect();
+        let values = sites.values.iter().zip(indices).map(|(v, i)| &v[*i]);
+        let all = sites.targets.iter().zip(values);
+        let new = all.filter(|(t, v)| self.stored(**t).as_ref() != Some(v));
+        let changes: Vec<_> = new.map(|(t, v)| (*t, Change::Set(v.clone()))).collect();
         let weight = self.propose(&changes, draws).map_err(|_| Halt::Fails)?;
         let same =
             |(t, s): (&Target, &Support)| self.dist(*t).is_some_and(|d| d.stored_support() == *s);

@@ -50,7 +50,10 @@ impl Tabulated {
 #[derive(Default)]
 struct Tables {
     factors: Vec<Factor>,
-    places: FxHashMap<NodeId, usize>,
+    /// By factor and choice of its scope: how far apart its entries are.
+    strides: Vec<Vec<usize>>,
+    /// The nodes with scores, each with its factor.
+    scores: Vec<(Option<usize>, NodeId)>,
     rest: f64,
 }
 
@@ -172,6 +175,25 @@ impl Trace {
 }
 
 impl Tables {
+    /// Tables without entries.
+    fn new(sites: &Sites) -> Result<Tables, Halt> {
+        let mut tables = Tables::default();
+        for scope in sites.scopes.values() {
+            let (mut strides, mut size) = (Vec::with_capacity(scope.len()), 1usize);
+            for x in scope {
+                strides.push(size);
+                size = size.saturating_mul(sites.values[*x].len());
+            }
+            if size > MOST {
+                return Err(Halt::Cannot("too many choices depend on each other"));
+            }
+            // NaN until an entry has been evaluated.
+            tables.factors.push(Factor { scope: scope.clone(), table: vec![f64::NAN; size] });
+            tables.strides.push(strides);
+        }
+        Ok(tables)
+    }
+
     /// Enters the entries that occur in a state for the first time.
     fn enter(
         &mut self,
@@ -181,48 +203,45 @@ impl Tables {
         power: f64,
     ) -> Result<(), Halt> {
         if state.first {
-            *self = Tables::default();
+            *self = Tables::new(sites)?;
         }
-        let counts: Vec<usize> = sites.values.iter().map(Vec::len).collect();
+        if !state.choices.is_empty() {
+            let places: FxHashMap<NodeId, usize> = sites.scopes.keys().copied().zip(0..).collect();
+            let scores = trace.scores_by_factor(&sites.scopes, state.choices);
+            let place = |f: Option<NodeId>| f.and_then(|f| places.get(&f).copied());
+            self.scores = scores.into_iter().map(|(f, n)| (place(f), n)).collect();
+        }
         // The entry of each factor that this state shows first.
-        let mut open: FxHashMap<NodeId, (usize, usize)> = FxHashMap::default();
-        for (node, scope) in &sites.scopes {
-            let size = scope.iter().try_fold(1, |n: usize, x| n.checked_mul(counts[*x]));
-            let size = size.filter(|n| *n <= MOST);
-            let size = size.ok_or(Halt::Cannot("too many choices depend on each other"))?;
-            let factors = &mut self.factors;
-            let place = *self.places.entry(*node).or_insert_with(|| {
-                // NaN until an entry has been evaluated.
-                factors.push(Factor { scope: scope.clone(), table: vec![f64::NAN; size] });
-                factors.len() - 1
-            });
-            let entry = scope.iter().rev().fold(0, |p, x| p * counts[*x] + state.indices[*x]);
-            if factors[place].table[entry].is_nan() {
-                open.insert(*node, (place, entry));
-            }
-        }
-        let mut sums: FxHashMap<NodeId, [ExactSum; 2]> = FxHashMap::default();
+        let entry = |(f, strides): (&Factor, &Vec<usize>)| {
+            let at: usize = f.scope.iter().zip(strides).map(|(x, s)| s * state.indices[*x]).sum();
+            f.table[at].is_nan().then_some(at)
+        };
+        let open: Vec<Option<usize>> = self.factors.iter().zip(&self.strides).map(entry).collect();
+        let mut sums: Vec<[ExactSum; 2]> = vec![Default::default(); self.factors.len()];
         let mut base: [ExactSum; 2] = Default::default();
-        for (factor, n) in trace.scores_by_factor(&sites.scopes, state.choices) {
+        for (factor, n) in &self.scores {
             let [prior, likelihood] = match factor {
                 None if state.first => &mut base,
-                Some(f) if open.contains_key(&f) => sums.entry(f).or_default(),
+                Some(f) if open[*f].is_some() => &mut sums[*f],
                 _ => continue,
             };
-            trace.graph.put_scored(&trace.code, n, prior, likelihood);
+            trace.graph.put_scored(&trace.code, *n, prior, likelihood);
         }
         let tempered = |[prior, likelihood]: &[ExactSum; 2]| {
             let likelihood = likelihood.value();
             // An impossible state is impossible at every power.
-            let scaled = if likelihood == f64::NEG_INFINITY { likelihood } else { power * likelihood };
+            let scaled =
+                if likelihood == f64::NEG_INFINITY { likelihood } else { power * likelihood };
             prior.value() + scaled
         };
         if state.first {
             self.rest = tempered(&base);
         }
-        for (node, (place, entry)) in open {
-            // Observations of a factor may be absent in a state.
-            self.factors[place].table[entry] = sums.get(&node).map_or(0.0, tempered);
+        // Observations of a factor may be absent in a state: nothing is added for them.
+        for ((f, at), sum) in self.factors.iter_mut().zip(open).zip(&sums) {
+            if let Some(at) = at {
+                f.table[at] = tempered(sum);
+            }
         }
         Ok(())
     }
