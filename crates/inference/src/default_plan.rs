@@ -81,7 +81,7 @@ pub fn default_plan(code: &Arc<Code>, limits: &Limits) -> TraceResult<String> {
     let far = continuous > 0 && program.lies_far(uniform);
     if far {
         lines.push("  // Draws from the prior are impossible, or far from the data.".to_owned());
-        lines.push("  init(uniform());".to_owned());
+        lines.push("  init(unconstrained());".to_owned());
     } else if !independent {
         lines.push("  init(prior(20));".to_owned());
     }
@@ -194,20 +194,22 @@ impl Program {
         (any && rough.len() <= NAMED).then_some(rough)
     }
 
-    /// Whether draws from the prior are impossible, or lie so far below uniform starts in the
-    /// unconstrained space that chains had better begin there.
+    /// Whether draws from the prior are impossible, or a short ascent from the best of them
+    /// ends so far below those from uniform starts in the unconstrained space that chains had
+    /// better begin there.
     fn lies_far(&self, uniform: impl Fn(u64) -> TraceResult<Trace>) -> bool {
-        let best = |all: &mut dyn Iterator<Item = f64>| all.fold(f64::NEG_INFINITY, f64::max);
-        let prior = best(&mut self.draws.iter().map(free_density));
-        let one = |i: u64| {
-            let mut trace = uniform(i).ok()?;
-            approach(&mut trace, &StepContext::new(0, 0, i)).ok()?;
-            Some((free_density(&trace), trace.choice_count()))
+        let reached = |mut trace: Trace| {
+            approach(&mut trace, &StepContext::new(0, 0, 0)).ok()?;
+            Some((free_density(&trace), trace.choice_count() as f64))
         };
-        let all: Vec<(f64, usize)> = (0..UNIFORM).filter_map(one).collect();
-        let near = best(&mut all.iter().map(|(d, _)| *d));
-        let most = all.iter().map(|(_, n)| *n).max().unwrap_or(0) as f64;
-        near > f64::NEG_INFINITY && near - prior > FAR.0 + FAR.1 * most
+        let higher = |a: (f64, f64), b: (f64, f64)| if b.0 > a.0 { b } else { a };
+        let none = (f64::NEG_INFINITY, 0.0);
+        let by_density = |a: &&Trace, b: &&Trace| free_density(a).total_cmp(&free_density(b));
+        let best = self.draws.iter().max_by(by_density).cloned();
+        let prior = best.and_then(reached).map_or(none, |there| higher(none, there));
+        let all = (0..UNIFORM).filter_map(|i| reached(uniform(i).ok()?));
+        let near = all.fold(none, higher);
+        near.0 > f64::NEG_INFINITY && near.0 - prior.0 > FAR.0 + FAR.1 * near.1
     }
 
     /// Whether all finite choices can be summed out on a tape, and that costs little compared

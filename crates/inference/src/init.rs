@@ -249,10 +249,12 @@ impl Source<'_> {
     }
 }
 
-/// The log joint density of a state in the unconstrained space.
+/// The log joint density of a state in the unconstrained space; -∞ where it is undefined.
 pub(crate) fn free_density(trace: &Trace) -> f64 {
     let jacobian = |t: &Target| trace.free_to_move(*t).map(|(_, jacobian)| jacobian);
-    trace.log_joint() + trace.all_targets().iter().filter_map(jacobian).sum::<f64>()
+    let jacobians: f64 = trace.all_targets().iter().filter_map(jacobian).sum();
+    let density = trace.log_joint() + jacobians;
+    if density.is_nan() { f64::NEG_INFINITY } else { density }
 }
 
 /// Draws all choices of a trace again, except for those that are given, by an update with the

@@ -115,8 +115,8 @@ impl Step {
 pub enum Init {
     /// `prior(n)`, with the number of draws if it is given.
     Prior(Option<Formula>),
-    /// `uniform(n)`, with the number of restarts if it is given.
-    Uniform(Option<Formula>),
+    /// `unconstrained(n)`, with the number of restarts if it is given.
+    Unconstrained(Option<Formula>),
     /// `best_of(n, keep, from)`
     BestOf(BestOf),
 }

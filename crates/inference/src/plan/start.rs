@@ -63,7 +63,7 @@ pub(super) fn start_of(
         Some(Init::Prior(n)) => {
             return Ok((Start { draws: number(n, 1)?, ..Start::default() }, None));
         }
-        Some(Init::Uniform(n)) => {
+        Some(Init::Unconstrained(n)) => {
             let draws = number(n, RESTARTS)?;
             return Ok((Start { draws, by: By::Density, ..Start::default() }, None));
         }

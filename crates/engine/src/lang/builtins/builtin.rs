@@ -112,7 +112,7 @@ pub enum PlanForm {
     Init,
     Anneal,
     Prior,
-    Uniform,
+    Unconstrained,
     BestOf,
     Value,
     Elapsed,

@@ -404,7 +404,7 @@ impl Lowerer<'_> {
         let found = call(e).and_then(|(name, args)| Some((self.inference_name(name)?, args)));
         match found {
             Some(((i, form), args))
-                if matches!(form, PlanForm::Prior | PlanForm::Uniform | PlanForm::BestOf) =>
+                if matches!(form, PlanForm::Prior | PlanForm::Unconstrained | PlanForm::BestOf) =>
             {
                 let args = self.inference_args(table.get(i), args, e.span, around)?;
                 let mut args = args.into_iter();
@@ -414,7 +414,9 @@ impl Lowerer<'_> {
                 };
                 match form {
                     PlanForm::Prior => return Some(StepKind::Init(Init::Prior(value()))),
-                    PlanForm::Uniform => return Some(StepKind::Init(Init::Uniform(value()))),
+                    PlanForm::Unconstrained => {
+                        return Some(StepKind::Init(Init::Unconstrained(value())));
+                    }
                     _ => {}
                 }
                 let (draws, keep) = (value()?, value());
@@ -425,10 +427,12 @@ impl Lowerer<'_> {
                 Some(StepKind::Init(Init::BestOf(BestOf { draws, keep, from })))
             }
             _ => {
-                self.error("`init` takes prior(), best_of(n) or uniform()", e.span, "not a start")
-                    .hint_also(
-                        "init(best_of(100)); starts at the best of 100 draws from the prior",
-                    );
+                self.error(
+                    "`init` takes prior(), best_of(n) or unconstrained()",
+                    e.span,
+                    "not a start",
+                )
+                .hint_also("init(best_of(100)); starts at the best of 100 draws from the prior");
                 None
             }
         }

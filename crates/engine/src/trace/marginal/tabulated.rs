@@ -16,6 +16,8 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 /// The maximum number of states in which scores are evaluated, and of entries of a factor.
 const MOST: usize = 1 << 14;
+/// The same for states times nodes of the trace: a second or two.
+const MOST_WORK: usize = 1 << 24;
 
 /// Tables of the joint density of finite choices.
 #[derive(Clone, Debug, Default)]
@@ -91,7 +93,8 @@ impl Trace {
             let visit = |trace: &mut Trace, sites: &Sites, state: Visited| {
                 tables.enter(trace, sites, state, power)
             };
-            match self.visit_states(&mut sites, (MOST, false), draws, visit) {
+            let most = (MOST_WORK / self.graph.nodes.len().max(1)).clamp(1, MOST);
+            match self.visit_states(&mut sites, (most, false), draws, visit) {
                 Ok(()) => break self.tabulated(&sites, tables),
                 Err(Halt::Fails) => break Tabulation::Fails,
                 Err(Halt::Cannot(why)) => break refused(self, why),

@@ -29,7 +29,10 @@ pub(super) const EXAMPLES: Examples = &[
             "infer { warmup 200 { anneal(10); drift(@x); } repeat 100 { drift(@x); collect x; } }"
         ),
     ),
-    ("uniform", number!("infer { init(uniform()); repeat 100 { drift(@x); collect x; } }")),
+    (
+        "unconstrained",
+        number!("infer { init(unconstrained()); repeat 100 { drift(@x); collect x; } }"),
+    ),
     ("prior", number!("infer { init(prior()); repeat 100 { drift(@x); collect x; } }")),
     (
         "best_of",
