@@ -219,7 +219,7 @@ pub struct Registered {
 /// applies one kernel for each possible place, in a fixed order; where the present state
 /// has no member the kernel does nothing. Each of them leaves the posterior invariant, and
 /// so does the sweep.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Sweep {
     of: Arc<Vec<Target>>,
     order: Vec<Target>,
@@ -279,18 +279,14 @@ impl Registered {
     fn sweep_in(&mut self, trace: &mut Trace) -> &mut Sweep {
         let selection = self.selection(trace);
         let of = trace.listed(selection);
-        let sweep = match self.sweep.take() {
-            Some(sweep) if Arc::ptr_eq(&sweep.of, of) => sweep,
-            before => {
-                let (of, order) = (Arc::clone(of), trace.in_program_order(selection));
-                let last = before.and_then(|s| s.last());
-                let visited = last.map_or(0, |last| {
-                    order.iter().position(|t| *t == last).map_or(order.len(), |i| i + 1)
-                });
-                Sweep { of, order, visited }
-            }
-        };
-        self.sweep.insert(sweep)
+        if !self.sweep.as_ref().is_some_and(|s| Arc::ptr_eq(&s.of, of)) {
+            let (of, order) = (Arc::clone(of), trace.in_program_order(selection));
+            let last = self.sweep.as_ref().and_then(Sweep::last);
+            let place = |last| order.iter().position(|t| *t == last);
+            let visited = last.map_or(0, |t| place(t).map_or(order.len(), |i| i + 1));
+            self.sweep = Some(Sweep { of, order, visited });
+        }
+        self.sweep.get_or_insert_default()
     }
 
     /// One member: chosen uniformly, with the number of candidates, or the next one of the
