@@ -47,7 +47,7 @@ pub use gather::evidence::{Evidence, Weighed};
 pub use gather::kept::{KeptTrace, KeptTraces};
 pub use gather::trajectory::{Trajectory, TrajectoryState};
 pub use init::attempts;
-pub use init::{Start, StartError, starts};
+pub use init::{NoStart, Start, StartError, starts};
 pub use kernel::accepts;
 pub use kernel::{Kernel, Outcome, Pick, SiteSelection, StepContext, decide, recoverable};
 pub use kernels::{

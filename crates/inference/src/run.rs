@@ -123,6 +123,18 @@ pub enum ChainError {
     Checkpoint(StateError),
 }
 
+impl ChainError {
+    /// Whether the chain found no state to start from. Another chain may find one, so that this
+    /// is no reason to lose the draws of the others.
+    pub fn is_of_the_start(&self) -> bool {
+        match self {
+            ChainError::Start(StartError::Run(e)) => e.is_recoverable(),
+            ChainError::Start(StartError::Impossible(_)) => true,
+            _ => false,
+        }
+    }
+}
+
 impl From<StateError> for ChainError {
     fn from(e: StateError) -> Self {
         ChainError::Checkpoint(e)
