@@ -20,8 +20,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub struct Gathered {
     pub compiled: Arc<Compiled>,
     pub chains: Vec<ChainResult>,
-    /// A sentence on each chain that could not start.
-    pub unstarted: Vec<String>,
+    /// Sentences on the starts of chains.
+    pub warnings: Vec<String>,
     pub draws: Vec<ChainDraws>,
     pub best: Option<Arc<BestState>>,
     /// None if it cannot be told whose it is.
@@ -36,7 +36,7 @@ pub struct Gathered {
 pub struct Posterior {
     compiled: Arc<Compiled>,
     chains: Mutex<Vec<ChainResult>>,
-    unstarted: Vec<String>,
+    of_starts: Vec<String>,
     groups: Vec<Group>,
     quantities: Vec<Quantity>,
     modes: Vec<Mode>,
@@ -75,7 +75,7 @@ impl Posterior {
             quantities,
             compiled: g.compiled,
             chains: Mutex::new(g.chains),
-            unstarted: g.unstarted,
+            of_starts: g.warnings,
             best: g.best,
             seed: g.seed,
             seconds: g.seconds,
@@ -167,7 +167,7 @@ impl Posterior {
         self.with_chains(|all| {
             let kernels = table::merged(all.iter().map(|c| &c.kernels[..]));
             let more = warnings(&self.quantities, &self.modes, &kernels, all.len());
-            self.unstarted.iter().cloned().chain(more).collect()
+            self.of_starts.iter().cloned().chain(more).collect()
         })
     }
 

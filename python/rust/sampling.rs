@@ -94,11 +94,11 @@ impl Run {
         let started = model.started(results?).map_err(|e| self.compiled.raised(e))?;
         self.compiled.check()?;
         // Evidence is kept by the number of a chain, and modes ask by its place among all.
-        let counted = self.first_chain == 0 && started.unstarted.is_empty();
+        let counted = self.first_chain == 0 && started.places.len() == memories.len();
         Ok(Posterior::new(Gathered {
             compiled: Arc::clone(&self.compiled),
             chains: started.chains,
-            unstarted: started.unstarted,
+            warnings: started.warnings,
             draws: started.places.iter().map(|i| memories[*i].draws()).collect(),
             best: best.state(),
             evidence: counted.then_some(evidence),

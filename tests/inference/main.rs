@@ -21,5 +21,6 @@ mod planted_errors;
 mod posteriordb;
 mod published;
 mod resume;
+mod starts;
 mod summing_out;
 mod transitions;

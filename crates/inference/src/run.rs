@@ -1,7 +1,7 @@
 //! What a run of chains is given, and what it gives: settings, progress, results, errors.
 
 use super::callback::Callback;
-use super::init::StartError;
+use super::init::{NoStart, StartError};
 use super::neighbours::Banks;
 use super::pause::Pause;
 use super::state::StateError;
@@ -108,6 +108,9 @@ pub struct ChainResult {
     pub sites: Vec<SiteStats>,
     /// Wall time.
     pub seconds: f64,
+    /// What had probability zero in all states with the values that `force` sets, so that the
+    /// chain started without them.
+    pub contradicted: Option<NoStart>,
 }
 
 /// Why a chain ended early.

@@ -151,7 +151,7 @@ impl Model {
     ///
     /// # Errors
     /// If no chain can start or the program fails. Chains that cannot start while others do are
-    /// named in [`Posterior::unstarted`].
+    /// named in [`Posterior::warnings`].
     pub fn run(
         &self,
         options: &RunOptions,
@@ -161,11 +161,11 @@ impl Model {
         let memories: Vec<Memory> = (0..chains.max(1)).map(|_| Memory::default()).collect();
         let sinks = memories.iter().map(|m| Box::new(m.clone()) as Box<dyn Sink>).collect();
         let results = self.run_into(options, threads, &Progress::default(), sinks)?;
-        let Started { chains, places, unstarted } = self.started(results)?;
+        let Started { chains, places, warnings } = self.started(results)?;
         Ok(Posterior {
             draws: places.iter().map(|i| memories[*i].draws()).collect(),
             chains,
-            unstarted,
+            warnings,
         })
     }
 
@@ -202,8 +202,9 @@ pub struct Posterior {
     pub draws: Vec<ChainDraws>,
     /// The last state of each chain, its kernels and its statistics.
     pub chains: Vec<ChainResult>,
-    /// A sentence on each chain that found no state to start from and is left out.
-    pub unstarted: Vec<String>,
+    /// A sentence on each chain that found no state to start from and is left out, or that
+    /// started without what `force` sets.
+    pub warnings: Vec<String>,
 }
 
 impl Posterior {

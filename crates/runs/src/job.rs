@@ -363,7 +363,7 @@ fn fill(
     let interrupted = progress.cancelled.load(Ordering::Relaxed);
     let sampled = begun.elapsed().as_secs_f64();
 
-    let Started { chains, places: ran, unstarted } = model.started(results)?;
+    let Started { chains, places: ran, mut warnings } = model.started(results)?;
     write_traces(dir, kept)?;
     write_lines(dir, TRAJECTORY, &trajectory.all())?;
     let mut draws: Vec<ChainDraws> = memories.iter().map(Memory::draws).collect();
@@ -388,7 +388,6 @@ fn fill(
     let every = draws.iter().map(|d| d.every).max().unwrap_or(1);
     let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
     let modes = modes(&quantities, Some(&evidence));
-    let mut warnings = unstarted;
     warnings.extend(pcadlang_report::warnings(&quantities, &modes, &kernels, chains.len()));
     let person = job.inputs.who.person.unwrap_or(1);
     if *chooses {

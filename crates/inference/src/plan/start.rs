@@ -3,6 +3,7 @@
 use crate::calls::build::arguments;
 use crate::calls::error::fail;
 use crate::calls::formula::{PlanEnv, evaluate};
+use crate::force::Forced;
 use crate::init::Start;
 use crate::kernels::ProgramKernel;
 use crate::run::{ChainError, RunOptions};
@@ -11,10 +12,11 @@ use pcadlang_engine::lang::error::RunError;
 use pcadlang_engine::lang::plan::{BestOf, Callee, Formula, KernelCall, Plan, StepKind};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::{Draws, Trace};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// How a chain starts, and the kernel that proposes its states, if any.
-type StartOf = (Start, Option<ProgramKernel>);
+/// How a chain starts, the kernel that proposes its states, if any, and what is forced.
+type StartOf = (Start, Option<ProgramKernel>, Forced);
 
 /// How chains start, which is the same for all of them: worked out by the first.
 #[derive(Debug, Default)]
@@ -40,25 +42,27 @@ impl SharedStart {
 }
 
 /// Reads the `init` statement of a plan: how to start, and the kernel it proposes from
-/// (`from = …`), if any.
+/// (`from = …`), if any; and the `force` statements of the program.
 pub(super) fn start_of(
     code: &Arc<Code>,
     plan: &Plan,
     options: &RunOptions,
 ) -> Result<StartOf, ChainError> {
+    let key = StreamKey::new(options.seed, 0, Purpose::START);
+    let forced = Forced::of(code, 0, key, &options.limits)?;
     let init = plan.steps.iter().find_map(|s| match &s.kind {
         StepKind::Init(start) => Some(start),
         _ => None,
     });
     let Some(Some(BestOf { draws, keep, from })) = init else {
-        return Ok((Start::default(), None));
+        return Ok((Start::default(), None, forced));
     };
     let mut trace = Trace::prior(Arc::clone(code), options.limits.clone());
     let mut env = PlanEnv::before(&mut trace, Draws::default());
     let draws = count(draws, &mut env)?;
     let keep = keep.as_ref().map_or(Ok(1), |f| count(f, &mut env))?;
     let from = from.as_ref().map(|call| own(plan, call, &mut env)).transpose()?;
-    Ok((Start { draws, keep: keep.min(draws) as usize, within: None }, from))
+    Ok((Start { draws, keep: keep.min(draws) as usize, within: None }, from, forced))
 }
 
 fn count(f: &Formula, env: &mut PlanEnv) -> Result<u64, Box<RunError>> {

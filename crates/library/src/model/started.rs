@@ -12,8 +12,8 @@ pub struct Started {
     pub chains: Vec<ChainResult>,
     /// The place of each of them among the chains of the run, from 0.
     pub places: Vec<usize>,
-    /// A sentence on each of the others.
-    pub unstarted: Vec<String>,
+    /// A sentence on each of the others, and on each that started without what `force` sets.
+    pub warnings: Vec<String>,
 }
 
 impl Model {
@@ -27,16 +27,24 @@ impl Model {
         results: Vec<Result<ChainResult, ChainError>>,
     ) -> Result<Started, Error> {
         let (all, mut first) = (results.len(), None);
-        let mut started = Started { chains: vec![], places: vec![], unstarted: vec![] };
+        let mut started = Started { chains: vec![], places: vec![], warnings: vec![] };
         for (i, result) in results.into_iter().enumerate() {
             match result {
-                Ok(chain) => {
+                Ok(mut chain) => {
+                    if let Some(by) = chain.contradicted.take() {
+                        let by = ChainError::Start(StartError::Impossible(by));
+                        started.warnings.push(format!(
+                            "chain {} of {all} started without what `force` sets, with which {}",
+                            i + 1,
+                            in_short(&self.chain_error(by))
+                        ));
+                    }
                     started.chains.push(chain);
                     started.places.push(i);
                 }
                 Err(e) if e.is_of_the_start() => {
                     let e = self.chain_error(e);
-                    started.unstarted.push(format!(
+                    started.warnings.push(format!(
                         "chain {} of {all} could not start and is left out: {}",
                         i + 1,
                         in_short(&e)
@@ -72,7 +80,7 @@ impl Model {
 
 /// Says what has probability zero in the states that were tried.
 fn impossible(zero: &NoStart) -> Diagnostic {
-    let mut d = Diagnostic::new(Severity::Error, format!("cannot start a chain: {zero}"));
+    let mut d = Diagnostic::new(Severity::Error, format!("cannot start any chain: {zero}"));
     for (i, term) in zero.terms.iter().take(5).enumerate() {
         let why = term.outside.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
         d = match i {
@@ -102,7 +110,7 @@ fn impossible(zero: &NoStart) -> Diagnostic {
 /// An error as a part of a sentence: what is wrong, where and why.
 fn in_short(e: &Error) -> String {
     let Some(d) = e.diagnostics.first() else { return String::new() };
-    let said = d.message.strip_prefix("cannot start a chain: ").unwrap_or(&d.message);
+    let said = d.message.strip_prefix("cannot start any chain: ").unwrap_or(&d.message);
     match d.labels.iter().find(|l| l.primary) {
         Some(l) if l.text.is_empty() => format!("{said} ({})", e.sources.locate(l.span)),
         Some(l) => format!("{said}; {} ({})", l.text, e.sources.locate(l.span)),
