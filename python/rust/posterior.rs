@@ -20,6 +20,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub struct Gathered {
     pub compiled: Arc<Compiled>,
     pub chains: Vec<ChainResult>,
+    /// Sentences on the starts of chains.
+    pub warnings: Vec<String>,
     pub draws: Vec<ChainDraws>,
     pub best: Option<Arc<BestState>>,
     /// None if it cannot be told whose it is.
@@ -34,6 +36,7 @@ pub struct Gathered {
 pub struct Posterior {
     compiled: Arc<Compiled>,
     chains: Mutex<Vec<ChainResult>>,
+    of_starts: Vec<String>,
     groups: Vec<Group>,
     quantities: Vec<Quantity>,
     modes: Vec<Mode>,
@@ -72,6 +75,7 @@ impl Posterior {
             quantities,
             compiled: g.compiled,
             chains: Mutex::new(g.chains),
+            of_starts: g.warnings,
             best: g.best,
             seed: g.seed,
             seconds: g.seconds,
@@ -162,7 +166,8 @@ impl Posterior {
     fn warnings(&self) -> Vec<String> {
         self.with_chains(|all| {
             let kernels = table::merged(all.iter().map(|c| &c.kernels[..]));
-            warnings(&self.quantities, &self.modes, &kernels, all.len())
+            let more = warnings(&self.quantities, &self.modes, &kernels, all.len());
+            self.of_starts.iter().cloned().chain(more).collect()
         })
     }
 

@@ -91,16 +91,17 @@ impl Run {
             || self.compiled.run(self.plan.as_deref(), &options, self.threads, &progress, sinks);
         let (results, interrupted) = wait(&self.compiled, &progress, look, run)?;
         let results = results.map_err(|e| self.compiled.raised(e));
-        let results = results?.into_iter().collect::<Result<Vec<_>, _>>();
-        let results = results.map_err(|e| self.compiled.raised(model.chain_error(e)))?;
+        let started = model.started(results?).map_err(|e| self.compiled.raised(e))?;
         self.compiled.check()?;
+        // Evidence is kept by the number of a chain, and modes ask by its place among all.
+        let counted = self.first_chain == 0 && started.places.len() == memories.len();
         Ok(Posterior::new(Gathered {
             compiled: Arc::clone(&self.compiled),
-            chains: results,
-            draws: memories.iter().map(Memory::draws).collect(),
+            chains: started.chains,
+            warnings: started.warnings,
+            draws: started.places.iter().map(|i| memories[*i].draws()).collect(),
             best: best.state(),
-            // Evidence is kept by the number of a chain, and modes ask by its place among all.
-            evidence: (self.first_chain == 0).then_some(evidence),
+            evidence: counted.then_some(evidence),
             seed: self.seed,
             seconds: begun.elapsed().as_secs_f64(),
             interrupted,

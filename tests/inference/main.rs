@@ -22,5 +22,6 @@ mod planted_errors;
 mod posteriordb;
 mod published;
 mod resume;
+mod starts;
 mod summing_out;
 mod transitions;

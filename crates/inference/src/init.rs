@@ -1,5 +1,6 @@
 //! Initial states: traces of positive probability, and an explanation when none is found.
 
+use super::force::Forced;
 use super::kernel::{Kernel, StepContext};
 use super::kernels::{Exact, ProgramKernel, approach};
 use pcadlang_engine::lang::address::Address;
@@ -54,7 +55,7 @@ impl Default for Start {
 const SPREAD: f64 = 2.0;
 
 /// How many draws from the prior may have zero probability before that is an error.
-const RETRIES: u64 = 1000;
+pub(crate) const RETRIES: u64 = 1000;
 
 /// Why a chain cannot start.
 #[derive(Debug, Clone)]
@@ -126,23 +127,24 @@ pub fn starts(
     how: Start,
     limits: Limits,
 ) -> Result<Vec<Trace>, StartError> {
-    starts_from(code, (seed, chain), how, None, limits)
+    starts_from(code, (seed, chain), how, (None, &Forced::default()), limits)
 }
 
 /// As [`starts`], but each draw is moved to what a kernel of the program proposes from
 /// it. If that does not depend on the draw, the draw is made with the values that the
-/// kernel proposes, so that each is compared with the observations once.
+/// kernel proposes, so that each is compared with the observations once. Forced choices
+/// have their values in all of them.
 pub(crate) fn starts_from(
     code: &Arc<Code>,
     (seed, chain): (u64, u32),
     how: Start,
-    from: Option<&ProgramKernel>,
+    (from, forced): (Option<&ProgramKernel>, &Forced),
     limits: Limits,
 ) -> Result<Vec<Trace>, StartError> {
     let mut begun = Instant::now();
     let key = StreamKey::new(seed, chain, Purpose::START);
-    let by = how.by;
-    let mut source = Source { code, seed, chain, key, by, from, limits: &limits, last: None };
+    let (limits, by) = (&limits, how.by);
+    let mut source = Source { code, seed, chain, key, by, from, forced, limits, last: None };
     // With what they are compared by, in descending order.
     let mut best: Vec<(f64, Trace)> = Vec::new();
     let mut found = 0;
@@ -211,6 +213,7 @@ struct Source<'a> {
     key: StreamKey,
     by: By,
     from: Option<&'a ProgramKernel>,
+    forced: &'a Forced,
     limits: &'a Limits,
     /// The last draw, of which the next is an update, if the kernel's proposal does not
     /// depend on the draw.
@@ -222,13 +225,14 @@ impl Source<'_> {
     fn draw(&mut self, attempt: u64) -> TraceResult<Option<Cow<'_, Trace>>> {
         let draws = Draws { key: self.key, step: attempt, substream: 0 };
         let spread = (self.by == By::Density).then_some(SPREAD);
-        let (code, limits) = (self.code, self.limits);
-        let simulate =
-            || Trace::started(Arc::clone(code), [], spread, draws, limits.clone()).map(|(t, _)| t);
+        let simulate = || self.forced.draw(self.code, (Vec::new(), spread), draws, self.limits);
         if self.by == By::Density {
             let mut trace = simulate()?;
             let at = StepContext::new(self.seed, self.chain, attempt).within(u64::MAX - 3);
-            approach(&mut trace, &at)?;
+            // Forced choices stay where they are.
+            if self.forced.is_empty() {
+                approach(&mut trace, &at)?;
+            }
             return Ok(Some(Cow::Owned(trace)));
         }
         let Some(from) = self.from else { return Ok(Some(Cow::Owned(simulate()?))) };
@@ -239,11 +243,15 @@ impl Source<'_> {
             if from.ignores_the_state() {
                 self.last = Some(trace.clone());
             }
-            return Ok(from.leap(&mut trace, &at)?.map(|()| Cow::Owned(trace)));
+            let Some(()) = from.leap(&mut trace, &at)? else { return Ok(None) };
+            self.forced.put(&mut trace, draws)?;
+            return Ok(Some(Cow::Owned(trace)));
         };
-        let given = from.proposal(&mut last, &at)?;
-        if !redrawn(&mut last, &given, draws) {
-            last = Trace::generate(Arc::clone(self.code), given, draws, self.limits.clone())?.0;
+        let given = self.forced.over(from.proposal(&mut last, &at)?);
+        if redrawn(&mut last, &given, draws) {
+            self.forced.put(&mut last, draws)?;
+        } else {
+            last = self.forced.draw(self.code, (given, None), draws, self.limits)?;
         }
         Ok(Some(Cow::Borrowed(self.last.insert(last))))
     }
@@ -321,7 +329,16 @@ mod tests {
         let key = StreamKey::new(7, 0, Purpose::START);
         let limits = Limits::default();
         let (code, from) = (&compiled_text.code, Some(&from));
-        let mut source = Source { code, seed: 7, chain: 0, key, from, limits: &limits, last: None };
+        let mut source = Source {
+            code,
+            seed: 7,
+            chain: 0,
+            key,
+            from,
+            forced: &Forced::default(),
+            limits: &limits,
+            last: None,
+        };
         // What depends on a choice is another matter.
         let other = text.replace("normal(m +", "normal(m + x +");
         let plan = &compiled(&other).plans[0];

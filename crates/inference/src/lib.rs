@@ -41,13 +41,13 @@ pub use calls::host_kernel::KernelCall;
 pub use calls::selection::{not_a_selection, selected};
 pub use chains::run_chains;
 pub use default_plan::default_plan;
-pub use force::put as force;
+pub use force::force;
 pub use gather::best::{BestSoFar, BestState};
 pub use gather::evidence::{Evidence, Weighed};
 pub use gather::kept::{KeptTrace, KeptTraces};
 pub use gather::trajectory::{Trajectory, TrajectoryState};
 pub use init::attempts;
-pub use init::{Start, StartError, starts};
+pub use init::{NoStart, Start, StartError, starts};
 pub use kernel::accepts;
 pub use kernel::{Kernel, Outcome, Pick, SiteSelection, StepContext, decide, recoverable};
 pub use kernels::{

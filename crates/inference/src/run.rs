@@ -1,7 +1,7 @@
 //! What a run of chains is given, and what it gives: settings, progress, results, errors.
 
 use super::callback::Callback;
-use super::init::StartError;
+use super::init::{NoStart, StartError};
 use super::neighbours::Banks;
 use super::pause::Pause;
 use super::state::StateError;
@@ -108,6 +108,9 @@ pub struct ChainResult {
     pub sites: Vec<SiteStats>,
     /// Wall time.
     pub seconds: f64,
+    /// What had probability zero in all states with the values that `force` sets, so that the
+    /// chain started without them.
+    pub contradicted: Option<NoStart>,
 }
 
 /// Why a chain ended early.
@@ -121,6 +124,18 @@ pub enum ChainError {
     Sink(std::io::Error),
     /// The chain cannot resume from the checkpoint.
     Checkpoint(StateError),
+}
+
+impl ChainError {
+    /// Whether the chain found no state to start from. Another chain may find one, so that this
+    /// is no reason to lose the draws of the others.
+    pub fn is_of_the_start(&self) -> bool {
+        match self {
+            ChainError::Start(StartError::Run(e)) => e.is_recoverable(),
+            ChainError::Start(StartError::Impossible(_)) => true,
+            _ => false,
+        }
+    }
 }
 
 impl From<StateError> for ChainError {

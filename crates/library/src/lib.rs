@@ -8,4 +8,4 @@ pub mod scene;
 pub mod shipped;
 pub mod standard;
 
-pub use model::{Model, Posterior, Program};
+pub use model::{Model, Posterior, Program, Started};

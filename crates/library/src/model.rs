@@ -4,12 +4,13 @@ mod camera;
 mod edited;
 mod hosted;
 mod program;
+mod started;
 
 pub use pcadlang_syntax::diag::Error;
 pub use program::Program;
+pub use started::Started;
 
 use pcadlang_engine::lang::code::Code;
-use pcadlang_engine::lang::error::RunError;
 use pcadlang_engine::lang::lower::{Compiled, Export, Report, compile_plan};
 use pcadlang_engine::lang::plan::Plan;
 use pcadlang_engine::lang::reach::Reach;
@@ -20,7 +21,7 @@ use pcadlang_numerics::platform::clock;
 use pcadlang_numerics::rng::{Purpose, StreamKey};
 use pcadlang_report::{ChainDraws, Memory, Quantity, quantities};
 use pcadlang_syntax::ast::ItemKind;
-use pcadlang_syntax::diag::{Diagnostic, IntoDiagnostic, Severity, SourceMap};
+use pcadlang_syntax::diag::{Diagnostic, Severity, SourceMap};
 use pcadlang_syntax::parse;
 use std::sync::{Arc, OnceLock};
 
@@ -108,49 +109,6 @@ impl Model {
             .map_err(|e| self.run_error(*e))
     }
 
-    /// Converts a failure at run time to diagnostics.
-    pub fn run_error(&self, e: RunError) -> Error {
-        Error { diagnostics: vec![e.into_diagnostic()], sources: self.sources.clone() }
-    }
-
-    /// Converts the failure of a chain to diagnostics.
-    pub fn chain_error(&self, e: ChainError) -> Error {
-        use pcadlang_inference::StartError;
-        let plain = |message: String| Diagnostic::new(Severity::Error, message);
-        let d = match e {
-            ChainError::Run(e) | ChainError::Start(StartError::Run(e)) => e.into_diagnostic(),
-            ChainError::Start(StartError::Impossible(zero)) => {
-                let mut d = plain(format!("cannot start any chain: {zero}"));
-                for (i, term) in zero.terms.iter().take(5).enumerate() {
-                    let why =
-                        term.outside.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
-                    d = match i {
-                        0 => d.primary(
-                            term.span,
-                            format!("the log density of {} is -inf{why}", term.address),
-                        ),
-                        _ => d.secondary(term.span, format!("so is that of {}{why}", term.address)),
-                    };
-                }
-                if zero.terms.len() > 5 {
-                    d = d.note(format!("and {} more", zero.terms.len() - 5));
-                }
-                if !zero.drawn.is_empty() {
-                    let drawn: Vec<String> =
-                        zero.drawn.iter().map(|(a, v)| format!("{a} = {v}")).collect();
-                    d = d.note(format!("in the last draw, {}", drawn.join(", ")));
-                }
-                d.hint(match zero.terms.first().is_some_and(|t| t.outside.is_some()) {
-                    true => "check the data, or observe them under a distribution whose support contains them",
-                    false => "use a wider prior or a wider likelihood; a factor of -inf excludes a state",
-                })
-            }
-            ChainError::Sink(e) => plain(format!("cannot write draws: {e}")),
-            ChainError::Checkpoint(e) => plain(format!("cannot resume a chain: {e}")),
-        };
-        Error { diagnostics: vec![d], sources: self.sources.clone() }
-    }
-
     /// Returns the inference plan: the program's first `infer` block, or the default
     /// plan. The second part is the text of the default plan, if that is used.
     ///
@@ -181,7 +139,8 @@ impl Model {
     /// on the number of threads.
     ///
     /// # Errors
-    /// If a chain cannot start or the program fails.
+    /// If no chain can start or the program fails. Chains that cannot start while others do are
+    /// named in [`Posterior::warnings`].
     pub fn run(
         &self,
         options: &RunOptions,
@@ -191,9 +150,12 @@ impl Model {
         let memories: Vec<Memory> = (0..chains.max(1)).map(|_| Memory::default()).collect();
         let sinks = memories.iter().map(|m| Box::new(m.clone()) as Box<dyn Sink>).collect();
         let results = self.run_into(options, threads, &Progress::default(), sinks)?;
-        let results =
-            results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| self.chain_error(e))?;
-        Ok(Posterior { draws: memories.iter().map(Memory::draws).collect(), chains: results })
+        let Started { chains, places, warnings } = self.started(results)?;
+        Ok(Posterior {
+            draws: places.iter().map(|i| memories[*i].draws()).collect(),
+            chains,
+            warnings,
+        })
     }
 
     /// Runs one chain per sink. A chain that fails does not stop the others.
@@ -229,6 +191,9 @@ pub struct Posterior {
     pub draws: Vec<ChainDraws>,
     /// The last state of each chain, its kernels and its statistics.
     pub chains: Vec<ChainResult>,
+    /// A sentence on each chain that found no state to start from and is left out, or that
+    /// started without what `force` sets.
+    pub warnings: Vec<String>,
 }
 
 impl Posterior {

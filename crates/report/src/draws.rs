@@ -31,8 +31,8 @@ impl Quantity {
         }
         let draws = || self.chains.iter().flatten();
         Some(match () {
-            () if self.chains.len() < 2 => "a single chain",
-            () if self.chains.iter().any(|c| c.len() < 4) => "fewer than 4 draws per chain",
+            () if self.drawn().count() < 2 => "a single chain",
+            () if self.drawn().any(|c| c.len() < 4) => "fewer than 4 draws per chain",
             () if draws().any(|x| x.is_nan()) => "it is missing from some draws",
             () if !draws().all(|x| x.is_finite()) => "it is infinite in some draws",
             () if self.is_stuck() => {
@@ -40,6 +40,11 @@ impl Quantity {
             }
             () => "it never moved",
         })
+    }
+
+    /// The chains that have draws.
+    pub(super) fn drawn(&self) -> impl Iterator<Item = &Vec<f64>> {
+        self.chains.iter().filter(|c| !c.is_empty())
     }
 
     /// Returns whether each chain is constant, but not all of them at the same value.

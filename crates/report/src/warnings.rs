@@ -22,7 +22,7 @@ pub fn warnings(
 ) -> Vec<String> {
     let mut out = Vec::new();
     if let Some(q) =
-        quantities.iter().find(|q| q.is_stuck() && q.chains.iter().all(|c| c.len() >= STUCK))
+        quantities.iter().find(|q| q.is_stuck() && q.drawn().all(|c| c.len() >= STUCK))
     {
         out.push(format!(
             "the chains disagree: {} never moved in any chain, and the chains have different \
@@ -95,9 +95,9 @@ fn worst(quantities: &[Quantity], f: impl Fn(&Quantity) -> f64) -> Option<(f64, 
     known.max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Returns whether some chain is too short to be split and compared.
+/// Returns whether some chain with draws is too short to be split and compared.
 fn too_short(q: &Quantity) -> bool {
-    q.chains.iter().any(|c| c.len() < 4)
+    q.drawn().any(|c| c.len() < 4)
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ use pcadlang_inference::{
     BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Progress, Trajectory,
     stuck_structure,
 };
-use pcadlang_library::Model;
+use pcadlang_library::{Model, Started};
 use pcadlang_report::{
     ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, modes, quantities,
     table, text_hash, widen, zarr,
@@ -363,8 +363,7 @@ fn fill(
     let interrupted = progress.cancelled.load(Ordering::Relaxed);
     let sampled = begun.elapsed().as_secs_f64();
 
-    let chains =
-        results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| model.chain_error(e))?;
+    let Started { chains, places: ran, mut warnings } = model.started(results)?;
     write_traces(dir, kept)?;
     write_lines(dir, TRAJECTORY, &trajectory.all())?;
     let mut draws: Vec<ChainDraws> = memories.iter().map(Memory::draws).collect();
@@ -377,8 +376,10 @@ fn fill(
     }
     widen(&mut draws);
     let points = chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
-    let step_sizes: Vec<_> =
-        chains.iter().map(|c| c.kernels.iter().find_map(|k| k.step_size)).collect();
+    let mut step_sizes = vec![None; draws.len()];
+    for (c, i) in chains.iter().zip(&ran) {
+        step_sizes[*i] = c.kernels.iter().find_map(|k| k.step_size);
+    }
     let zarr = zarr::write(dir.path(), &draws, &step_sizes, &points);
     zarr.map_err(|e| {
         plain(format!("{}: {e}; earlier output is kept", dir.file(zarr::ZARR).display()))
@@ -387,7 +388,7 @@ fn fill(
     let every = draws.iter().map(|d| d.every).max().unwrap_or(1);
     let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
     let modes = modes(&quantities, Some(&evidence));
-    let mut warnings = pcadlang_report::warnings(&quantities, &modes, &kernels, chains.len());
+    warnings.extend(pcadlang_report::warnings(&quantities, &modes, &kernels, chains.len()));
     let person = job.inputs.who.person.unwrap_or(1);
     if *chooses {
         warnings

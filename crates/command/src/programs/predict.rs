@@ -88,7 +88,9 @@ fn from_posterior(job: &Job, ready: &Ready) -> Result<Vec<Vec<Replication>>, Fai
         scope.spawn(|| progress::watch(&progress, (s.chains(), "chains"), &ending, s.time, false));
         ending.of(|| model.run_into(&options, job::threads(job), &progress, sinks))
     })?;
-    results.into_iter().collect::<Result<Vec<_>, _>>().map_err(|e| model.chain_error(e))?;
+    for warning in model.started(results)?.warnings {
+        error_line!("warning: {warning}");
+    }
     if progress.cancelled.load(Ordering::Relaxed) {
         return Err(Failure::Interrupted);
     }

@@ -151,10 +151,7 @@ fn measure(
         (results, looking.join().unwrap_or_default())
     });
     snapshots.push(watched.look(None));
-    let chains = results?
-        .into_iter()
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(|e| ready.model.chain_error(e))?;
+    let chains = ready.model.started(results?)?.chains;
     record.steps = chains.iter().map(|c| c.steps + c.warmup).sum();
     if let Truth::Posterior(reference) = &task.case.truth {
         let found = snapshots.last().map(|s| s.sums.normals()).unwrap_or_default();

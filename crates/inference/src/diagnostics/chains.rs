@@ -10,11 +10,12 @@ pub(super) struct Chains {
 }
 
 impl Chains {
-    /// Copies the draws; `None` if a chain has fewer than four, or a draw is not finite.
+    /// Copies the draws; `None` if a chain has fewer than four, or a draw is not finite. Chains
+    /// without draws, such as those that could not start, do not count.
     pub fn new<C: AsRef<[f64]>>(chains: &[C]) -> Option<Chains> {
-        let draws = chains.iter().map(|c| c.as_ref().len()).min()?;
-        let mut values: Vec<f64> =
-            chains.iter().flat_map(|c| c.as_ref().iter().take(draws)).copied().collect();
+        let drawn = || chains.iter().map(AsRef::as_ref).filter(|c| !c.is_empty());
+        let draws = drawn().map(<[f64]>::len).min()?;
+        let mut values: Vec<f64> = drawn().flat_map(|c| c.iter().take(draws)).copied().collect();
         let unit = unit(&values);
         values.iter_mut().for_each(|x| *x /= unit);
         (draws >= 4 && values.iter().all(|x| x.is_finite())).then_some(Chains {

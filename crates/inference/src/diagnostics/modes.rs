@@ -13,13 +13,14 @@ use super::r_hat;
 const APART: f64 = 1.3;
 
 /// Groups of chains, by number: each in order, the largest group first, then by first
-/// chain. `quantities[quantity][chain]` are draws. If all chains agree there is one
-/// group; without chains there are no groups.
+/// chain. `quantities[quantity][chain]` are draws; chains without any are left out. If all
+/// chains agree there is one group; without chains there are no groups.
 pub fn modes(quantities: &[&[Vec<f64>]]) -> Vec<Vec<usize>> {
     let chains = quantities.iter().map(|q| q.len()).max().unwrap_or(0);
     let mut group: Vec<usize> = (0..chains).collect();
-    for a in 0..chains {
-        for b in a + 1..chains {
+    let drawn = |c: &usize| quantities.iter().any(|q| q.get(*c).is_some_and(|x| !x.is_empty()));
+    for a in (0..chains).filter(drawn) {
+        for b in (a + 1..chains).filter(drawn) {
             if group[a] != group[b] && quantities.iter().all(|q| agree(q.get(a), q.get(b))) {
                 let (from, to) = (group[a].max(group[b]), group[a].min(group[b]));
                 group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
@@ -28,7 +29,7 @@ pub fn modes(quantities: &[&[Vec<f64>]]) -> Vec<Vec<usize>> {
     }
     let mut all: Vec<Vec<usize>> = Vec::new();
     for g in 0..chains {
-        let members: Vec<usize> = (0..chains).filter(|c| group[*c] == g).collect();
+        let members: Vec<usize> = (0..chains).filter(|c| group[*c] == g && drawn(c)).collect();
         if !members.is_empty() {
             all.push(members);
         }
@@ -86,5 +87,8 @@ mod tests {
         // A single short chain is enough for the comparison to be uninformative.
         let uneven = vec![vec![1.0, 2.0], vec![9.0; 60]];
         assert_eq!(modes(&[&uneven]), [vec![0, 1]]);
+        // A chain that never started says nothing about the others.
+        let missing = vec![vec![1.0; 60], vec![], vec![2.0; 60], vec![1.0; 60]];
+        assert_eq!(modes(&[&missing]), [vec![0, 3], vec![2]]);
     }
 }

@@ -9,7 +9,8 @@ mod start;
 mod warmup;
 
 use super::draws::Sink;
-use super::init::{Start, starts_from};
+use super::force::Forced;
+use super::init::{Start, StartError, starts_from};
 use super::population::Population;
 use super::run::{ChainError, ChainResult, Progress, RunOptions};
 use crate::calls::build::KernelMaker;
@@ -45,17 +46,22 @@ pub(crate) fn run_chain(
         check(code, &plan.steps, options)?;
         return Runner::resume(code, plan, options, progress, sink, chain, checkpoint)?.run();
     }
-    let (how, from) = shared.get(|| start_of(code, plan, options))?;
+    let (how, from, forced) = shared.get(|| start_of(code, plan, options))?;
     // Under a time limit a quarter of it is for the start, as much as that leaves to warm-up.
     let how = Start { within: options.time.map(|t| t / 4), ..how };
     check(code, &plan.steps, options)?;
-    let mut begun =
-        starts_from(code, (options.seed, chain), how, from.as_ref(), options.limits.clone())
-            .map_err(ChainError::Start)?;
-    for trace in &mut begun {
-        super::force::apply(code, trace, (options.seed, chain))?;
-    }
-    run_among(code, plan, options, progress, sink, (chain, started), begun)
+    let (seeded, limits) = ((options.seed, chain), &options.limits);
+    let start = |forced| starts_from(code, seeded, how, (from.as_ref(), forced), limits.clone());
+    // What is forced may contradict the observations; the chain then starts without it.
+    let (begun, contradicted) = match start(&forced) {
+        Err(StartError::Impossible(by)) if !forced.is_empty() => {
+            (start(&Forced::default()), Some(by))
+        }
+        begun => (begun, None),
+    };
+    let begun = begun.map_err(ChainError::Start)?;
+    let done = run_among(code, plan, options, progress, sink, (chain, started), begun)?;
+    Ok(ChainResult { contradicted, ..done })
 }
 
 /// Runs a plan from a given state, in place of a start from the prior; `force` statements

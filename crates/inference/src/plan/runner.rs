@@ -180,6 +180,7 @@ impl<'a> Runner<'a> {
             kernels: self.instances.into_iter().map(Instance::into_stats).collect(),
             sites: self.sites.into_stats(),
             seconds,
+            contradicted: None,
         })
     }
 

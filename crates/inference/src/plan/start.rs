@@ -3,6 +3,7 @@
 use crate::calls::build::arguments;
 use crate::calls::error::fail;
 use crate::calls::formula::{PlanEnv, evaluate};
+use crate::force::Forced;
 use crate::init::{By, Start};
 use crate::kernels::ProgramKernel;
 use crate::run::{ChainError, RunOptions};
@@ -11,13 +12,14 @@ use pcadlang_engine::lang::error::RunError;
 use pcadlang_engine::lang::plan::{BestOf, Callee, Formula, Init, KernelCall, Plan, StepKind};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::{Draws, Trace};
+use pcadlang_numerics::rng::{Purpose, StreamKey};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// How many uniform starts a chain compares, if the plan does not say.
 const RESTARTS: u64 = 4;
 
-/// How a chain starts, and the kernel that proposes its states, if any.
-type StartOf = (Start, Option<ProgramKernel>);
+/// How a chain starts, the kernel that proposes its states, if any, and what is forced.
+type StartOf = (Start, Option<ProgramKernel>, Forced);
 
 /// How chains start, which is the same for all of them: worked out by the first.
 #[derive(Debug, Default)]
@@ -43,12 +45,14 @@ impl SharedStart {
 }
 
 /// Reads the `init` statement of a plan: how to start, and the kernel it proposes from
-/// (`from = …`), if any.
+/// (`from = …`), if any; and the `force` statements of the program.
 pub(super) fn start_of(
     code: &Arc<Code>,
     plan: &Plan,
     options: &RunOptions,
 ) -> Result<StartOf, ChainError> {
+    let key = StreamKey::new(options.seed, 0, Purpose::START);
+    let forced = Forced::of(code, 0, key, &options.limits)?;
     let init = plan.steps.iter().find_map(|s| match &s.kind {
         StepKind::Init(start) => Some(start),
         _ => None,
@@ -59,13 +63,13 @@ pub(super) fn start_of(
         n.as_ref().map_or(Ok(otherwise), |f| count(f, &mut env))
     };
     let BestOf { draws, keep, from } = match init {
-        None => return Ok((Start::default(), None)),
+        None => return Ok((Start::default(), None, forced)),
         Some(Init::Prior(n)) => {
-            return Ok((Start { draws: number(n, 1)?, ..Start::default() }, None));
+            return Ok((Start { draws: number(n, 1)?, ..Start::default() }, None, forced));
         }
         Some(Init::Unconstrained(n)) => {
             let draws = number(n, RESTARTS)?;
-            return Ok((Start { draws, by: By::Density, ..Start::default() }, None));
+            return Ok((Start { draws, by: By::Density, ..Start::default() }, None, forced));
         }
         Some(Init::BestOf(best)) => best,
     };
@@ -73,7 +77,7 @@ pub(super) fn start_of(
     let keep = keep.as_ref().map_or(Ok(1), |f| count(f, &mut env))?;
     let from = from.as_ref().map(|call| own(plan, call, &mut env)).transpose()?;
     let keep = keep.min(draws) as usize;
-    Ok((Start { draws, keep, by: By::Best, within: None }, from))
+    Ok((Start { draws, keep, by: By::Best, within: None }, from, forced))
 }
 
 fn count(f: &Formula, env: &mut PlanEnv) -> Result<u64, Box<RunError>> {

@@ -254,13 +254,13 @@ impl Session {
         trace: &mut Trace,
         known: usize,
     ) -> Result<(), Trouble> {
-        let forces = model.code().forces.get(known..).unwrap_or_default();
         let draws = Draws {
             key: StreamKey::new(self.seed, 0, Purpose::START),
             step: self.clock,
             substream: ATTEMPTS,
         };
-        pcadlang_inference::force(forces, trace, draws).map_err(|e| Trouble::run(model, *e))
+        pcadlang_inference::force(model.code(), known, trace, draws)
+            .map_err(|e| Trouble::run(model, *e))
     }
 
     /// Records the present state for `:undo`; `what` describes the change that follows.
