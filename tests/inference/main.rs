@@ -20,6 +20,7 @@ mod own_kernels;
 mod planted_errors;
 mod posteriordb;
 mod published;
+mod published_models;
 mod resume;
 mod summing_out;
 mod transitions;
