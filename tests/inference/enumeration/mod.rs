@@ -239,6 +239,10 @@ fn judge(all: &Tally) {
             pooled.z()
         );
     }
+    // A kernel that never moves keeps every posterior.
+    for (class, (_, n, moved)) in &all.classes {
+        assert!(*n < 10 || 3 * moved >= *n, "{class}: only {moved} of {n} plans moved the state");
+    }
 }
 
 /// Every shortcut of incremental updates agrees with running the whole program again: in

@@ -287,7 +287,8 @@ impl Posterior {
     pub fn joint(&self, addresses: &[String]) -> BTreeMap<Vec<String>, f64> {
         let mut all = BTreeMap::new();
         for k in &self.kinds {
-            let value = |a| k.discrete.iter().find(|d| d.0 == *a).map(|d| format!("{}", d.1));
+            let value =
+                |a: &String| k.discrete.iter().find(|d| d.0 == *a).map(|d| format!("{}", d.1));
             *all.entry(addresses.iter().filter_map(value).collect()).or_default() += k.probability;
         }
         all

@@ -7,6 +7,7 @@ use super::execute::{Extent, Integration};
 use super::posterior::Posterior;
 use super::program::Program;
 use super::verdict::{Counts, Pooled};
+use pcadlang_inference::draws::Shape;
 use pcadlang_report::ChainDraws;
 
 /// The number of intervals in which positions of continuous choices are counted.
@@ -41,8 +42,16 @@ impl Records {
     /// Counts records: combinations of the discrete values, and the positions of each continuous
     /// one, which are uniform. An error if a quantity is missing.
     pub fn count(&self, draws: &ChainDraws, skip: usize) -> Result<(Counts, Pooled), String> {
+        let names: Vec<String> = draws
+            .columns
+            .iter()
+            .flat_map(|c| match c.shape {
+                Shape::Scalar => vec![c.name.clone()],
+                Shape::Vector(n) => (0..n).map(|i| format!("{}[{i}]", c.name)).collect(),
+            })
+            .collect();
         let column = |a: &String| {
-            let at = draws.columns.iter().position(|c| c.name == a[1..]);
+            let at = names.iter().position(|n| *n == a[1..]);
             at.ok_or_else(|| format!("{a} is not recorded"))
         };
         let rows = || draws.rows.iter().skip(skip);
@@ -58,8 +67,8 @@ impl Records {
             };
             seen[i] += 1;
         }
-        let names = joint.keys().map(|k| format!("recorded {:?} as {k:?}", self.discrete));
-        tabulate(names.zip(joint.values().copied()).zip(seen), &mut counts, &mut pooled);
+        let kinds = joint.keys().map(|k| format!("recorded {:?} as {k:?}", self.discrete));
+        tabulate(kinds.zip(joint.values().copied()).zip(seen), &mut counts, &mut pooled);
         for a in &self.continuous {
             let i = column(a)?;
             let mut bins = [0; BINS];
