@@ -21,6 +21,7 @@ mod own_kernels;
 mod planted_errors;
 mod posteriordb;
 mod published;
+mod published_models;
 mod resume;
 mod starts;
 mod summing_out;

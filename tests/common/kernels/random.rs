@@ -10,6 +10,7 @@ pub const ANY: &[&str] = &[
     "drift(one(@**), 0.8);",
     "drift(@**, 0.5);",
     "drift(one(@**));",
+    "drift(each(@**), 0.8);",
     "knn(@**, bank = \"b\");",
     "knn(one(@**), bank = \"b\", k = 2);",
     "temper(mh(one(@**)), levels = 3);",
@@ -19,6 +20,8 @@ pub const DISCRETE: &[&str] = &["gibbs(one($finite));", "gibbs(each($finite));"]
 /// Kernels for numeric choices.
 pub const CONTINUOUS: &[&str] = &[
     "slice(one($continuous));",
+    "slice(each($continuous));",
+    "drift(each($continuous), 0.8);",
     "slice($continuous, width = 0.3, doubling = true);",
     "elliptical($gaussian);",
     "elliptical(one($gaussian));",
@@ -37,6 +40,9 @@ pub const SUMMING: &[&str] = &[
     "mala($continuous, marginal = %);",
     "nuts($continuous, max_depth = 2, marginal = %);",
 ];
+/// Joint draws of finite choices, given the rest; they join [`ALL`] when the kernel exists.
+pub const EXACT: [&str; 2] = ["exact($finite);", "exact(%);"];
+pub const EXACT_EXISTS: bool = false;
 /// All of them.
 pub const ALL: &[&[&str]] =
     &[ANY, DISCRETE, CONTINUOUS, REVERSIBLE, SUMMING, &["delayed(mh(one(@**)), @y);"]];

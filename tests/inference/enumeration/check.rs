@@ -4,24 +4,32 @@
 
 use super::plans::Plan;
 use super::posterior::Posterior;
+use super::records::Records;
 use super::verdict::{Counts, Pooled};
 use pcadlang::Program;
 use pcadlang_engine::trace::{Draws, Limits, Trace};
-use pcadlang_inference::draws::Discard;
 use pcadlang_inference::{
     Callback, ChainError, Latent, Neighbours, Progress, RunOptions, run_from,
 };
 use pcadlang_numerics::rng::{Purpose, StreamKey};
+use pcadlang_report::Memory;
 use std::sync::{Arc, Mutex};
 
 /// The number of intervals in which positions of continuous choices are counted.
 const BINS: usize = 8;
 
+/// A program with its posterior, and the distribution of what it records if that is checked.
+pub struct Case {
+    pub text: String,
+    pub posterior: Arc<Posterior>,
+    pub records: Option<Records>,
+}
+
 /// The outcome of a check.
 pub enum Said {
-    /// The counts of the draws, the same for pooling, and the fraction of passes that
-    /// changed the state.
-    Counted(Counts, Pooled, f64),
+    /// The counts of the draws, the same for pooling, those of records, and the fraction of passes
+    /// that changed the state.
+    Counted(Counts, Pooled, Pooled, f64),
     /// The plan is refused for this program.
     Refused(String),
     /// The plan failed, or reached a state outside of the posterior's support.
@@ -92,11 +100,12 @@ impl Callback for Restart {
 }
 
 /// Checks a plan on a program, over `passes` passes.
-pub fn check(text: &str, posterior: &Arc<Posterior>, plan: &Plan, passes: u64, seed: u64) -> Said {
-    let Plan { statements, kernels, .. } = plan;
+pub fn check(case: &Case, plan: &Plan, passes: u64, seed: u64) -> Said {
+    let (Case { text, posterior, records }, Plan { statements, kernels, .. }) = (case, plan);
+    let collected = records.as_ref().map_or("1".to_owned(), Records::collected);
     let plan = format!(
         "{text}
-{kernels}infer {{ warmup 20 {{ {statements} }} repeat {passes} {{ {statements} collect 1; }} }}\n"
+{kernels}infer {{ warmup 20 {{ {statements} }} repeat {passes} {{ {statements} collect {collected}; }} }}\n"
     );
     let model = match Program::parse(&plan).and_then(Program::compile) {
         Ok(m) => m,
@@ -122,14 +131,27 @@ pub fn check(text: &str, posterior: &Arc<Posterior>, plan: &Plan, passes: u64, s
         Ok((plan, _)) => plan,
         Err(e) => return Said::Failed(format!("{e}")),
     };
-    let done =
-        run_from(model.code(), &plan, &options, &Progress::default(), &mut Discard, 0, trace);
+    let mut memory = Memory::default();
+    let done = run_from(model.code(), &plan, &options, &Progress::default(), &mut memory, 0, trace);
     let Ok(seen) = watch.seen.lock() else { return Said::Failed("the watch failed".into()) };
     if let Some(e) = &seen.failed {
         return Said::Failed(e.clone());
     }
     match done {
-        Ok(_) => count(posterior, &seen),
+        Ok(_) => {
+            let (mut counts, pooled, moved) = count(posterior, &seen);
+            // The first record is of a state that was not counted.
+            let counted = records.as_ref().map(|r| r.count(&memory.draws(), 1)).transpose();
+            let more = match counted {
+                Ok(Some((more, pooled))) => {
+                    counts.cells.extend(more.cells);
+                    pooled
+                }
+                Ok(None) => Pooled::default(),
+                Err(e) => return Said::Failed(e),
+            };
+            Said::Counted(counts, pooled, more, moved)
+        }
         Err(ChainError::Run(e)) if e.message.contains("cannot be summed out") => {
             Said::Refused(e.message.clone())
         }
@@ -140,19 +162,19 @@ pub fn check(text: &str, posterior: &Arc<Posterior>, plan: &Plan, passes: u64, s
     }
 }
 
-fn count(posterior: &Posterior, seen: &Seen) -> Said {
-    let probabilities = posterior.probabilities();
-    let draws = seen.ended.len() as u64;
-    let mut counts = Counts { draws, cells: Vec::new() };
-    let mut pooled = Pooled::default();
-    let mut by_kind = vec![0; probabilities.len()];
-    seen.ended.iter().for_each(|(k, _)| by_kind[*k] += 1);
-    // Rare kinds are merged into one.
+/// Adds a table of disjoint cells, each with its name, probability and count. Rare cells are merged
+/// into one.
+pub fn tabulate(
+    cells: impl Iterator<Item = ((String, f64), u64)>,
+    counts: &mut Counts,
+    pooled: &mut Pooled,
+) {
+    let draws = counts.draws;
     let (mut table, mut rest) = (Vec::new(), (0.0, 0));
-    for (i, (p, c)) in probabilities.iter().zip(&by_kind).enumerate() {
+    for ((name, p), c) in cells {
         if p * draws as f64 >= 5.0 {
-            counts.cells.push((format!("kind {i}"), *p, *c));
-            table.push((*p, *c));
+            counts.cells.push((name, p, c));
+            table.push((p, c));
         } else {
             rest = (rest.0 + p, rest.1 + c);
         }
@@ -163,6 +185,17 @@ fn count(posterior: &Posterior, seen: &Seen) -> Said {
         _ => table.push(rest),
     }
     pooled.add(draws, &table);
+}
+
+fn count(posterior: &Posterior, seen: &Seen) -> (Counts, Pooled, f64) {
+    let probabilities = posterior.probabilities();
+    let draws = seen.ended.len() as u64;
+    let mut counts = Counts { draws, cells: Vec::new() };
+    let mut pooled = Pooled::default();
+    let mut by_kind = vec![0; probabilities.len()];
+    seen.ended.iter().for_each(|(k, _)| by_kind[*k] += 1);
+    let named = probabilities.iter().enumerate().map(|(i, p)| (format!("kind {i}"), *p));
+    tabulate(named.zip(by_kind), &mut counts, &mut pooled);
     // The positions of continuous choices are uniform, whatever the kind of state.
     let uniform = 1.0 / BINS as f64;
     let dims = seen.ended.iter().map(|(_, u)| u.len()).max().unwrap_or(0);
@@ -188,7 +221,7 @@ fn count(posterior: &Posterior, seen: &Seen) -> Said {
         }
         pooled.add(n, &bins.map(|c| (uniform, c)));
     }
-    Said::Counted(counts, pooled, seen.moved as f64 / draws.max(1) as f64)
+    (counts, pooled, seen.moved as f64 / draws.max(1) as f64)
 }
 
 /// Returns the probability that a state has more than `d` continuous choices.

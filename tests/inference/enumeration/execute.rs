@@ -5,7 +5,10 @@
 //! afresh for each execution.
 
 use super::gaussian::{Affine, Gaussian, MOST};
-use super::program::{Body, Def, Dist, Effect, Expr, Function, Id, Item, Program, Right};
+use super::program::{
+    Body, Def, Dist, Effect, Expr, Function, Id, Item, Program, Recursion, Right,
+};
+use super::steps::{self, QUARTERS};
 use std::collections::HashMap;
 
 /// The number of cells of the grid over which a choice is integrated. The numbers that
@@ -32,6 +35,17 @@ pub enum Integration {
     Gaussian,
     /// On a grid: the program has a single standard normal choice.
     Grid,
+    /// By quarters: the program has a single beta choice, and compares it with quarters only.
+    Quarters,
+}
+
+/// What an execution evaluates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// What observations and factors need: the choices of a state.
+    State,
+    /// The choices that are recorded as well, whether anything reads them or not.
+    Records,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,8 +71,10 @@ pub struct Execution {
     /// Residuals of priors and observations, normal around 0, with their standard
     /// deviations.
     pub residuals: Vec<(Affine, f64)>,
-    /// The grid point of the continuous choice; there are two per cell.
+    /// The grid point of the continuous choice, two per cell, or its quarter.
     pub point: Option<usize>,
+    /// The shapes of a beta choice.
+    pub shapes: Option<(f64, f64)>,
     /// The log weight of everything else.
     pub log_weight: f64,
 }
@@ -96,14 +112,19 @@ struct Run<'p> {
 pub fn executions(
     program: &Program,
     integration: Integration,
+    extent: Extent,
     most: usize,
     mut each: impl FnMut(Execution),
 ) -> Result<()> {
     let mut script: Vec<(usize, usize)> = Vec::new();
-    let most = if integration == Integration::Grid { 2 * CELLS * most } else { most };
+    let most = match integration {
+        Integration::Gaussian => most,
+        Integration::Grid => 2 * CELLS * most,
+        Integration::Quarters => QUARTERS * most,
+    };
     for _ in 0..most {
         let mut run = Run::new(program, integration, script);
-        run.everything()?;
+        run.everything(extent)?;
         if run.out.log_weight > f64::NEG_INFINITY {
             run.out.discrete.sort_by(|a, b| a.0.cmp(&b.0));
             each(run.out);
@@ -140,7 +161,7 @@ impl<'p> Run<'p> {
                     };
                     containers.extend(defs.iter().filter_map(drawn));
                 }
-                Item::Effect(_) | Item::Function(_) | Item::Memo(_) => {}
+                _ => {}
             }
         }
         let root = Frame {
@@ -167,11 +188,10 @@ impl<'p> Run<'p> {
         }
     }
 
-    fn everything(&mut self) -> Result<()> {
+    fn everything(&mut self, extent: Extent) -> Result<()> {
         let program = self.program;
         for (i, item) in program.items.iter().enumerate() {
             match item {
-                Item::Def(_) | Item::Function(_) | Item::Memo(_) => {}
                 Item::Effect(e) => self.effect(e, 0)?,
                 Item::Loop(n, _, effects) => {
                     for pass in 0..*n {
@@ -179,6 +199,28 @@ impl<'p> Run<'p> {
                         effects.iter().try_for_each(|e| self.effect(e, f))?;
                     }
                 }
+                _ => {}
+            }
+        }
+        if extent == Extent::Records { self.records() } else { Ok(()) }
+    }
+
+    fn records(&mut self) -> Result<()> {
+        let program = self.program;
+        for (i, item) in program.items.iter().enumerate() {
+            match item {
+                Item::Def(Def::Draw(n, _)) => drop(self.lookup(*n, 0)?),
+                Item::Predict(n, d) => drop(self.choose(d, 0, self.address(0, *n))?),
+                Item::Loop(passes, defs, _) => {
+                    for pass in 0..*passes {
+                        let f = self.pass(i, pass)?;
+                        for d in defs {
+                            let Def::Draw(n, _) = d else { continue };
+                            self.lookup(*n, f)?;
+                        }
+                    }
+                }
+                _ => {}
             }
         }
         Ok(())
@@ -319,6 +361,13 @@ impl<'p> Run<'p> {
             self.out.point = Some(i);
             return Ok(Val::Num(Affine::number(x)));
         }
+        if let Dist::Beta(a, b) = d {
+            let i = self.pick(QUARTERS);
+            self.out.log_weight += steps::mass((*a, *b), i).ln();
+            self.out.continuous.push(address);
+            (self.out.point, self.out.shapes) = (Some(i), Some((*a, *b)));
+            return Ok(Val::Num(Affine::number((i as f64 + 0.5) / QUARTERS as f64)));
+        }
         let values = self.values(d, f)?;
         if values.is_empty() {
             return Err(Unsuitable);
@@ -393,6 +442,7 @@ impl<'p> Run<'p> {
                             g.params.iter().zip(args).map(|(p, a)| (*p, a, f)).collect();
                         self.eval(&g.body.result, inner)
                     }
+                    Right::Recursion(g) => self.recursion(&self.program.recursions[*g], binding, 0),
                     Right::Memo(g, arg) => {
                         let key = self.eval(arg, f)?;
                         self.memo(*g, key)
@@ -400,6 +450,18 @@ impl<'p> Run<'p> {
                 }
             }
         }
+    }
+
+    fn recursion(&mut self, g: &'p Recursion, from: String, depth: usize) -> Result<Val> {
+        let prefix = format!("{from}/{}", g.name);
+        let inner = self.frame(0, &g.defs, prefix.clone(), None);
+        self.frames[inner].keys = vec![(g.param, Val::Num(Affine::number(depth as f64)))];
+        if !self.truth(&g.again, inner)? {
+            return self.eval(&g.stop, inner);
+        }
+        let step = self.affine(&g.step, inner)?;
+        let Val::Num(rest) = self.recursion(g, prefix, depth + 1)? else { return Err(Unsuitable) };
+        Ok(Val::Num(step.plus(&rest)))
     }
 
     fn memo(&mut self, g: usize, key: Val) -> Result<Val> {

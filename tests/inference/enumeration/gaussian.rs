@@ -104,6 +104,13 @@ impl Gaussian {
         self.coloured(white).iter().zip(&self.mean).map(|(x, m)| x + m).collect()
     }
 
+    /// Returns the standard deviation of a choice.
+    pub fn sd(&self, i: usize) -> f64 {
+        let n = self.mean.len();
+        let unit = |k| (0..n).map(|j| f64::from(u8::from(j == k))).collect::<Vec<f64>>();
+        (0..n).map(|k| self.coloured(&unit(k))[i].powi(2)).sum::<f64>().sqrt()
+    }
+
     /// Returns the log density of the draw that corresponds to white noise.
     pub fn log_density(&self, white: &[f64]) -> f64 {
         white

@@ -3,7 +3,9 @@
 //! appear and vanish, and continuous choices on which all of these may depend.
 
 use super::execute::Integration;
-use super::program::{Body, Def, Dist, Effect, Expr, Function, Id, Item, Program, Right};
+use super::program::{
+    Body, Def, Dist, Effect, Expr, Function, Id, Item, Program, Recursion, Right,
+};
 use pcadlang_numerics::rng::{Purpose, Stream, StreamKey};
 
 /// The expressions in scope: discrete names with their greatest value, and numbers that
@@ -13,7 +15,7 @@ struct SiteSelection {
     truths: Vec<Expr>,
     counts: Vec<(Expr, usize)>,
     reals: Vec<Expr>,
-    /// The choice that is integrated on the grid.
+    /// The choice that is integrated on the grid, or by quarters.
     grid: Option<Expr>,
 }
 
@@ -31,15 +33,32 @@ struct Generator {
     scope: SiteSelection,
     functions: Vec<(Vec<Kind>, Kind)>,
     memos: Vec<(Kind, Kind)>,
+    /// Whether wide programs have one of their features. Others have none, and draw nothing from
+    /// this stream, so that seeds keep their programs.
+    wide: Option<Stream>,
 }
 
 /// Returns a random program, and how its continuous choices are integrated.
 pub fn program(seed: u64) -> (Program, Integration) {
+    generate(seed, None)
+}
+
+/// Returns a random program that may also lack data, have choices that nothing reads, predictions,
+/// recursion, probabilities near or at 0 and 1, and densities with poles.
+pub fn wide(seed: u64) -> (Program, Integration) {
+    generate(seed, Some(StreamKey::new(seed, 1, Purpose::VALUES).stream(0, 0, 0)))
+}
+
+fn generate(seed: u64, mut wide: Option<Stream>) -> (Program, Integration) {
     let mut rng = StreamKey::new(seed, 0, Purpose::VALUES).stream(0, 0, 0);
-    let integration = if rng.uniform() < 0.25 { Integration::Grid } else { Integration::Gaussian };
+    let mut integration =
+        if rng.uniform() < 0.25 { Integration::Grid } else { Integration::Gaussian };
+    if integration == Integration::Grid && wide.as_mut().is_some_and(|w| w.uniform() < 0.5) {
+        integration = Integration::Quarters;
+    }
     let (program, scope) = (Program::default(), SiteSelection::default());
-    let mut g =
-        Generator { rng, program, integration, scope, functions: Vec::new(), memos: Vec::new() };
+    let (functions, memos) = (Vec::new(), Vec::new());
+    let mut g = Generator { rng, program, integration, scope, functions, memos, wide };
     g.fill();
     (g.program, integration)
 }
@@ -51,6 +70,10 @@ fn boxed(e: Expr) -> Box<Expr> {
 impl Generator {
     fn chance(&mut self, p: f64) -> bool {
         self.rng.uniform() < p
+    }
+
+    fn is_wide(&mut self, p: f64) -> bool {
+        self.wide.as_mut().is_some_and(|w| w.uniform() < p)
     }
 
     fn among(&mut self, from: usize, to: usize) -> usize {
@@ -75,6 +98,12 @@ impl Generator {
                 self.scope.grid = Some(Expr::Ref(x));
                 self.scope.reals.push(Expr::Ref(x));
             }
+            Integration::Quarters => {
+                let (x, shapes) = (self.program.name("x"), [0.1, 0.5, 2.0]);
+                let (a, b) = (shapes[self.rng.index(3)], shapes[self.rng.index(3)]);
+                self.program.items.push(Item::Def(Def::Draw(x, Dist::Beta(a, b))));
+                self.scope.grid = Some(Expr::Ref(x));
+            }
             Integration::Gaussian if discrete_only => {}
             Integration::Gaussian => {
                 for _ in 0..self.among(1, 2) {
@@ -88,8 +117,15 @@ impl Generator {
                 }
             }
         }
+        if self.is_wide(0.5) {
+            let d = self.unread("e");
+            self.program.items.push(Item::Def(d));
+        }
         for _ in 0..self.among(0, 1) {
             self.function();
+        }
+        if self.is_wide(0.4) {
+            self.recursion();
         }
         if self.chance(0.35) {
             self.memo();
@@ -108,6 +144,57 @@ impl Generator {
         for _ in 0..self.among(1, 2) {
             let e = self.effect(2);
             self.program.items.push(Item::Effect(e));
+        }
+        while self.is_wide(0.35) {
+            if let Def::Draw(n, d) = self.unread("q") {
+                self.program.items.push(Item::Predict(n, d));
+            }
+        }
+        if self.is_wide(0.15) {
+            self.program.items.retain(|i| !matches!(i, Item::Effect(_)));
+            for item in &mut self.program.items {
+                if let Item::Loop(_, _, effects) = item {
+                    effects.clear();
+                }
+            }
+        }
+    }
+
+    /// Returns a draw that nothing reads.
+    fn unread(&mut self, name: &str) -> Def {
+        let n = self.program.name(name);
+        let is_gaussian = self.integration == Integration::Gaussian && self.chance(0.4);
+        Def::Draw(n, if is_gaussian { self.gaussian() } else { self.discrete().0 })
+    }
+
+    /// Adds a recursive function of up to three calls, and the value of one: a count of its calls,
+    /// or a sum of numbers that are drawn in each.
+    fn recursion(&mut self) {
+        let (param, s) = (self.program.name("k"), self.program.name("s"));
+        let outside = self.scope.clone();
+        self.scope.counts.push((Expr::Ref(param), 2));
+        let mut defs = vec![Def::Draw(s, Dist::Flip(self.probability(1)))];
+        let (mut step, mut stop) = (Expr::Num(1.0), Expr::Num(0.0));
+        let is_real = self.integration == Integration::Gaussian && self.chance(0.5);
+        if is_real {
+            let u = self.program.name("u");
+            defs.push(Def::Draw(u, self.gaussian()));
+            step = Expr::Ref(u);
+            if self.chance(0.5) {
+                stop = Expr::Ref(u);
+            }
+        }
+        self.scope = outside;
+        let more = Expr::Less(boxed(Expr::Ref(param)), boxed(Expr::Num(1.5)));
+        let again = Expr::And(boxed(Expr::Ref(s)), boxed(more));
+        let (i, n) = (self.program.recursions.len(), self.program.name("l"));
+        let name = format!("r{i}");
+        self.program.recursions.push(Recursion { name, param, defs, again, step, stop });
+        self.program.items.push(Item::Recursion(i));
+        self.program.items.push(Item::Def(Def::Let(n, Right::Recursion(i))));
+        match is_real {
+            true => self.scope.reals.push(Expr::Ref(n)),
+            false => self.scope.counts.push((Expr::Ref(n), 2)),
         }
     }
 
@@ -224,6 +311,9 @@ impl Generator {
     }
 
     fn probability(&mut self, depth: usize) -> Expr {
+        if self.is_wide(0.15) {
+            return Expr::Num(if self.chance(0.5) { 1e-6 } else { 1.0 - 1e-6 });
+        }
         let p = self.tenths(1, 9);
         match self.rng.index(4) {
             0 if depth > 0 => {
@@ -415,6 +505,9 @@ impl Generator {
             let d = self.binding();
             defs.push(d);
         }
+        if self.is_wide(0.3) {
+            defs.push(self.unread("e"));
+        }
         let effects = (0..self.among(1, 2)).map(|_| self.effect(1)).collect();
         self.program.items.push(Item::Loop(passes, defs, effects));
         // Choices of the loop can be read after it.
@@ -443,7 +536,10 @@ impl Generator {
             }
             1 => {
                 let c = self.condition(3);
-                let (a, b) = (self.tenths(-15, 5), self.tenths(-15, 5));
+                let (mut a, b) = (self.tenths(-15, 5), self.tenths(-15, 5));
+                if self.is_wide(0.3) {
+                    a = f64::NEG_INFINITY;
+                }
                 Effect::Factor(Expr::If(boxed(c), boxed(Expr::Num(a)), boxed(Expr::Num(b))))
             }
             2 => {

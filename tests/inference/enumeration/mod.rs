@@ -19,9 +19,11 @@ mod generate;
 mod plans;
 mod posterior;
 mod program;
+mod records;
+mod steps;
 mod verdict;
 
-use check::{Said, check};
+use check::{Case, Said, check};
 use pcadlang::Model;
 use pcadlang_engine::trace::{Change, Draws, Limits, Trace};
 use pcadlang_inference::calibration::{PlanSampler, Settings, geweke};
@@ -29,6 +31,8 @@ use pcadlang_inference::{Progress, RunOptions};
 use pcadlang_numerics::rng::{Purpose, StreamKey};
 use plans::Plan;
 use posterior::Posterior;
+use program::Program;
+use records::Records;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -40,6 +44,31 @@ const SECOND_LOOK: u64 = 10_000;
 /// fails.
 const SUSPICIOUS: f64 = 1e-3;
 const WRONG: f64 = 1e-9;
+
+/// How programs are generated.
+#[derive(Clone, Copy)]
+enum Made {
+    Narrow,
+    /// With the features of [`generate::wide`]; their records are checked as well.
+    Wide,
+}
+
+impl Made {
+    /// Returns a program, with its posterior if it can be enumerated.
+    fn case(self, seed: u64) -> Option<(Program, Case)> {
+        let (program, integration) = match self {
+            Made::Narrow => generate::program(seed),
+            Made::Wide => generate::wide(seed),
+        };
+        let posterior = Arc::new(Posterior::of(&program, integration)?);
+        let records = match self {
+            Made::Narrow => None,
+            Made::Wide => Records::of(&program, integration),
+        };
+        let text = program.to_string();
+        Some((program, Case { text, posterior, records }))
+    }
+}
 
 /// Results over many programs.
 #[derive(Default)]
@@ -70,14 +99,13 @@ impl Tally {
         }
     }
 
-    fn program(&mut self, seed: u64) {
-        let (program, integration) = generate::program(seed);
-        let Some(posterior) = Posterior::of(&program, integration) else {
+    fn program(&mut self, seed: u64, made: Made) {
+        let Some((program, case)) = made.case(seed) else {
             self.unsuitable += 1;
             return;
         };
-        let (text, posterior) = (program.to_string(), Arc::new(posterior));
-        let model = Model::from_text(&text).unwrap_or_else(|e| panic!("seed {seed}: {e}\n{text}"));
+        let text = &case.text;
+        let model = Model::from_text(text).unwrap_or_else(|e| panic!("seed {seed}: {e}\n{text}"));
         // The statements that the default plan repeats.
         let default = match model.plan() {
             Ok((_, Some(plan))) => {
@@ -89,31 +117,58 @@ impl Tally {
             _ => "mh(one(@**));".to_owned(),
         };
         self.programs += 1;
+        if let Some(records) = case.records.as_ref().filter(|_| !program.has_effects()) {
+            self.without_data(seed, &model, records);
+        }
         let mut rng = StreamKey::new(seed, 0, Purpose::MIX).stream(0, 0, 0);
-        for plan in plans::plans(&program, &posterior, &default, &mut rng) {
-            self.plan(seed, &text, &posterior, &plan);
+        for plan in plans::plans(&program, &case.posterior, &default, &mut rng) {
+            self.plan(seed, &case, &plan);
         }
     }
 
-    fn plan(&mut self, seed: u64, text: &str, posterior: &Arc<Posterior>, plan: &Plan) {
+    /// Without data every record of the default plan is an independent draw from the prior, in
+    /// one chain as well.
+    fn without_data(&mut self, seed: u64, model: &Model, records: &Records) {
+        self.plans += 1;
+        let said = model.run(&RunOptions { seed, ..RunOptions::default() }, 1, 1);
+        let counted = said.map_err(|e| e.to_string()).and_then(|p| records.count(&p.draws[0], 0));
+        let what = match counted {
+            Err(e) => e,
+            Ok((counts, pooled)) => {
+                let e = self.classes.entry("default plan, no data".into()).or_default();
+                e.0.merge(&pooled);
+                (e.1, e.2) = (e.1 + 1, e.2 + 1);
+                let (p, cell) = counts.p_value();
+                if p >= WRONG {
+                    return;
+                }
+                format!("p = {p:.1e}: {cell}")
+            }
+        };
+        self.wrong.push(format!("seed {seed}: the default plan\n{what}\n{}", model.text()));
+    }
+
+    fn plan(&mut self, seed: u64, case: &Case, plan: &Plan) {
         self.plans += 1;
         let wrong = |what: &str| {
-            format!("seed {seed}: {}\n{what}\n{text}{}", plan.statements, plan.kernels)
+            format!("seed {seed}: {}\n{what}\n{}{}", plan.statements, case.text, plan.kernels)
         };
-        match check(text, posterior, plan, plan.first_look(), seed) {
+        match check(case, plan, plan.first_look(), seed) {
             Said::Refused(why) => {
                 let why = why.split_once(": ").map_or(why.clone(), |(_, w)| w.to_owned());
                 *self.refused.entry(why).or_default() += 1;
             }
             Said::Failed(e) => self.wrong.push(wrong(&e)),
-            Said::Counted(counts, pooled, moved) => {
-                let e = self.classes.entry(plan.class.clone()).or_default();
-                e.0.merge(&pooled);
-                (e.1, e.2) =
-                    (e.1 + 1, e.2 + u64::from(moved > 0.0 || posterior.likeliest() > 0.999));
+            Said::Counted(counts, pooled, records, moved) => {
+                let has_moved = moved > 0.0 || case.posterior.likeliest() > 0.999;
+                for (class, pooled) in [(&*plan.class, pooled), ("records", records)] {
+                    let e = self.classes.entry(class.to_owned()).or_default();
+                    e.0.merge(&pooled);
+                    (e.1, e.2) = (e.1 + 1, e.2 + u64::from(has_moved));
+                }
                 if counts.p_value().0 < SUSPICIOUS {
                     self.second_looks += 1;
-                    match check(text, posterior, plan, SECOND_LOOK, seed ^ 0x5eed_5eed) {
+                    match check(case, plan, SECOND_LOOK, seed ^ 0x5eed_5eed) {
                         Said::Counted(counts, ..) => {
                             let (p, cell) = counts.p_value();
                             if p < WRONG {
@@ -149,7 +204,7 @@ impl Tally {
 }
 
 /// Checks programs on all cores.
-fn tally(seeds: impl Iterator<Item = u64>) -> Tally {
+fn tally(seeds: impl Iterator<Item = u64>, made: Made) -> Tally {
     let (seeds, next) = (seeds.collect::<Vec<_>>(), AtomicU64::new(0));
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let mut all = Tally::default();
@@ -157,7 +212,7 @@ fn tally(seeds: impl Iterator<Item = u64>) -> Tally {
         let work = || {
             let mut own = Tally::default();
             while let Some(seed) = seeds.get(next.fetch_add(1, Ordering::Relaxed) as usize) {
-                own.program(*seed);
+                own.program(*seed, made);
             }
             own
         };
@@ -184,14 +239,16 @@ fn judge(all: &Tally) {
             pooled.z()
         );
     }
+    // A kernel that never moves keeps every posterior.
+    for (class, (_, n, moved)) in &all.classes {
+        assert!(*n < 10 || 3 * moved >= *n, "{class}: only {moved} of {n} plans moved the state");
+    }
 }
 
 /// Every shortcut of incremental updates agrees with running the whole program again: in
 /// the weights, in the choices that appear and vanish, and in errors.
-fn updates_agree(seed: u64) -> u64 {
-    let (program, integration) = generate::program(seed);
-    let Some(posterior) = Posterior::of(&program, integration) else { return 0 };
-    let text = program.to_string();
+fn updates_agree(seed: u64, made: Made) -> u64 {
+    let Some((_, Case { text, posterior, .. })) = made.case(seed) else { return 0 };
     let model = Model::from_text(&text).unwrap_or_else(|e| panic!("seed {seed}: {e}\n{text}"));
     let key = StreamKey::new(seed, 3, Purpose::VALUES);
     let (mut compared, mut rng) = (0, StreamKey::new(seed, 0, Purpose::MIX).stream(1, 0, 0));
@@ -239,8 +296,10 @@ fn updates_agree(seed: u64) -> u64 {
 
 #[test]
 fn short_cuts_of_updates_agree_with_running_everything_again() {
-    let compared: u64 = (0..300).map(updates_agree).sum();
-    assert!(compared > 10_000, "{compared}");
+    for made in [Made::Narrow, Made::Wide] {
+        let compared: u64 = (0..300).map(|seed| updates_agree(seed, made)).sum();
+        assert!(compared > 10_000, "{compared}");
+    }
 }
 
 /// Runs Geweke's joint distribution test on a random program whose observations have
@@ -297,7 +356,12 @@ fn number(name: &str, otherwise: u64) -> u64 {
 
 #[test]
 fn random_programs_keep_their_posterior() {
-    judge(&tally(0..60));
+    judge(&tally(0..60, Made::Narrow));
+}
+
+#[test]
+fn wide_programs_keep_their_posterior() {
+    judge(&tally(0..60, Made::Wide));
 }
 
 /// Seeds and plans that once revealed errors.
@@ -318,11 +382,8 @@ const ONCE_NOT_REFUSED: [(u64, &str); 2] = [
 fn tally_plans(plans: &[(u64, &str)]) -> Tally {
     let mut all = Tally::default();
     for (seed, statements) in plans {
-        let (program, integration) = generate::program(*seed);
-        let posterior = Posterior::of(&program, integration)
-            .unwrap_or_else(|| panic!("{seed} is not enumerated"));
-        let plan = Plan::of("once wrong", *statements);
-        all.plan(*seed, &program.to_string(), &Arc::new(posterior), &plan);
+        let case = Made::Narrow.case(*seed).unwrap_or_else(|| panic!("{seed} is not enumerated"));
+        all.plan(*seed, &case.1, &Plan::of("once wrong", *statements));
     }
     all
 }
@@ -342,7 +403,14 @@ fn plans_that_were_wrong_once() {
 #[ignore = "minutes"]
 fn many_random_programs_keep_their_posterior() {
     let first = number("FIRST", 1000);
-    judge(&tally(first..first + number("ENUMERATED", 3000)));
+    judge(&tally(first..first + number("ENUMERATED", 3000), Made::Narrow));
+}
+
+#[test]
+#[ignore = "minutes"]
+fn many_wide_programs_keep_their_posterior() {
+    let first = number("FIRST", 1000);
+    judge(&tally(first..first + number("ENUMERATED", 3000), Made::Wide));
 }
 
 /// Not an exact test: long chains of the default plan, started from the prior, come close
@@ -352,13 +420,15 @@ fn many_random_programs_keep_their_posterior() {
 fn default_plans_reach_the_posterior() {
     let first = number("FIRST", 1000);
     let (mut programs, mut far) = (0, Vec::new());
-    for seed in first..first + number("ENUMERATED", 60).min(300) {
-        let (program, integration) = generate::program(seed);
-        let Some(posterior) = Posterior::of(&program, integration) else { continue };
-        let (text, posterior) = (program.to_string(), Arc::new(posterior));
+    let seeds = first..first + number("ENUMERATED", 60).min(300);
+    for (seed, made) in seeds.flat_map(|s| [(s, Made::Narrow), (s, Made::Wide)]) {
+        let Some((_, Case { text, posterior, .. })) = made.case(seed) else { continue };
         let model = Model::from_text(&text).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
-        let Ok((_, Some(plan))) = model.plan() else { continue };
         programs += 1;
+        let Ok((_, Some(plan))) = model.plan() else {
+            far.push(format!("seed {seed}: no plan\n{text}"));
+            continue;
+        };
         let distance = check::distance(&text, &plan, &posterior, seed);
         if distance > 0.1 {
             far.push(format!("seed {seed}: total variation {distance:.2}\n{plan}{text}"));

@@ -3,7 +3,9 @@
 
 use super::posterior::Posterior;
 use super::program::{Def, Dist, Effect, Item, Program};
-use crate::common::kernels::random::{ANY, CONTINUOUS, DISCRETE, REVERSIBLE, SUMMING};
+use crate::common::kernels::random::{
+    ANY, CONTINUOUS, DISCRETE, EXACT, EXACT_EXISTS, REVERSIBLE, SUMMING,
+};
 use pcadlang_numerics::rng::Stream;
 
 /// Statements, the declarations of kernels that they need, and the class in which their
@@ -44,7 +46,7 @@ fn with_surrogates(p: &Program) -> Vec<String> {
         match item {
             Item::Effect(e) => of(p, e, &mut all),
             Item::Loop(_, _, effects) => effects.iter().for_each(|e| of(p, e, &mut all)),
-            Item::Def(_) | Item::Function(_) | Item::Memo(_) => {}
+            _ => {}
         }
     }
     all
@@ -95,6 +97,16 @@ pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream
                 k.replace('%', &chosen.join(" + ")),
             ));
         }
+    }
+    // Sums alone: nothing continuous is left to move.
+    if !posterior.has_continuous && !sites.is_empty() {
+        let (k, (site, _)) = (SUMMING[rng.index(SUMMING.len())], sites[rng.index(sites.len())]);
+        all.push(Plan::of(format!("{} alone", class(k)), k.replace('%', site)));
+    }
+    if EXACT_EXISTS && !sites.is_empty() {
+        let (k, a, b) = (EXACT[rng.index(2)], rng.index(sites.len()), rng.index(sites.len()));
+        let both = [sites[a].0.as_str(), sites[b].0.as_str()].join(" + ");
+        all.push(Plan::of(class(k), k.replace('%', &both)));
     }
     let coarse = with_surrogates(p);
     if !coarse.is_empty() {

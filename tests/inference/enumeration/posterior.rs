@@ -1,8 +1,9 @@
 //! The enumerated posterior of a program: draws from it, and the cells of draws.
 
-use super::execute::{CELLS, Execution, Integration, POINT, REACH, WIDTH, executions};
+use super::execute::{CELLS, Execution, Extent, Integration, POINT, REACH, WIDTH, executions};
 use super::gaussian::Gaussian;
 use super::program::Program;
+use super::steps::Steps;
 use pcadlang::Value;
 use pcadlang_engine::trace::{Address, Constraint, Trace};
 use pcadlang_numerics::dist::Datum;
@@ -17,6 +18,7 @@ enum Continuous {
     None,
     Gaussian(Vec<String>, Gaussian),
     Grid(String, Grid),
+    Quarters(String, Steps),
 }
 
 /// A density that is log-linear within each cell.
@@ -105,22 +107,34 @@ fn key(discrete: &[(String, f64, bool)]) -> Key {
     discrete.iter().map(|(a, v, _)| (a.clone(), format!("{v}"))).collect()
 }
 
+fn phi(z: f64) -> f64 {
+    0.5 * statrs::function::erf::erfc(-z / 2.0f64.sqrt())
+}
+
 impl Posterior {
-    /// Enumerates a posterior; `None` if that is impossible, or if its mass is zero.
+    /// Enumerates the posterior of a program's states; `None` if that is impossible, or if its mass
+    /// is zero.
     pub fn of(program: &Program, integration: Integration) -> Option<Posterior> {
-        let most = if integration == Integration::Grid { 100 } else { 400 };
+        Posterior::over(program, integration, Extent::State)
+    }
+
+    /// The same, over all choices of this extent.
+    pub fn over(program: &Program, integration: Integration, extent: Extent) -> Option<Posterior> {
+        let most = if integration == Integration::Gaussian { 400 } else { 100 };
+        let most = if extent == Extent::Records { 4 * most } else { most };
         let mut p = Posterior {
             kinds: Vec::new(),
             by_key: BTreeMap::new(),
             discrete: BTreeMap::new(),
             has_continuous: false,
         };
-        executions(program, integration, most, |e| p.enter(e, integration)).ok()?;
+        executions(program, integration, extent, most, |e| p.enter(e, integration)).ok()?;
         for kind in &mut p.kinds {
             kind.log_total = match &mut kind.continuous {
                 Continuous::None => kind.log_weight,
                 Continuous::Gaussian(_, g) => kind.log_weight + g.log_evidence,
                 Continuous::Grid(_, grid) => grid.add_up(),
+                Continuous::Quarters(_, steps) => steps.add_up(),
             };
         }
         let most = p.kinds.iter().map(|k| k.log_total).fold(f64::NEG_INFINITY, f64::max);
@@ -144,6 +158,9 @@ impl Posterior {
             let continuous = match (integration, e.continuous.first()) {
                 (_, None) => Continuous::None,
                 (Integration::Grid, Some(x)) => Continuous::Grid(x.clone(), Grid::new()),
+                (Integration::Quarters, Some(x)) => {
+                    Continuous::Quarters(x.clone(), Steps::new(e.shapes.unwrap_or_default()))
+                }
                 (Integration::Gaussian, _) => {
                     Continuous::Gaussian(e.continuous.clone(), e.gaussian())
                 }
@@ -157,8 +174,10 @@ impl Posterior {
                 log_total: 0.0,
             });
         }
-        if let (Continuous::Grid(_, grid), Some(at)) = (&mut self.kinds[i].continuous, e.point) {
-            grid.points[at / 2][at % 2] = e.log_weight;
+        match (&mut self.kinds[i].continuous, e.point) {
+            (Continuous::Grid(_, grid), Some(at)) => grid.points[at / 2][at % 2] = e.log_weight,
+            (Continuous::Quarters(_, steps), Some(at)) => steps.set(at, e.log_weight),
+            _ => {}
         }
     }
 
@@ -168,7 +187,7 @@ impl Posterior {
             let continuous = match &k.continuous {
                 Continuous::None => false,
                 Continuous::Gaussian(all, _) => all.iter().any(|a| a == address),
-                Continuous::Grid(a, _) => a == address,
+                Continuous::Grid(a, _) | Continuous::Quarters(a, _) => a == address,
             };
             continuous || k.discrete.iter().any(|d| d.0 == address)
         })
@@ -206,6 +225,10 @@ impl Posterior {
                 state.push(number(address, grid.quantile(rng.uniform())));
                 log_joint = None;
             }
+            Continuous::Quarters(address, steps) => {
+                state.push(number(address, steps.quantile(rng.uniform())));
+                log_joint = None;
+            }
         }
         (state, log_joint)
     }
@@ -234,13 +257,13 @@ impl Posterior {
                 let x: Option<Vec<f64>> =
                     addresses.iter().map(|a| numbers.get(a).copied()).collect();
                 let x = x.filter(|x| x.len() == numbers.len())?;
-                g.whitened(&x)
-                    .iter()
-                    .map(|z| 0.5 * statrs::function::erf::erfc(-z / 2.0f64.sqrt()))
-                    .collect()
+                g.whitened(&x).iter().map(|z| phi(*z)).collect()
             }
             Continuous::Grid(address, grid) => {
                 vec![grid.below(*numbers.get(address).filter(|_| numbers.len() == 1)?)]
+            }
+            Continuous::Quarters(address, steps) => {
+                vec![steps.below(*numbers.get(address).filter(|_| numbers.len() == 1)?)]
             }
         };
         Some((i, places))
@@ -253,10 +276,37 @@ impl Posterior {
             let n = match &k.continuous {
                 Continuous::None => 0,
                 Continuous::Gaussian(all, _) => all.len(),
-                Continuous::Grid(..) => 1,
+                Continuous::Grid(..) | Continuous::Quarters(..) => 1,
             };
             (k.probability, n)
         })
+    }
+
+    /// Returns the probability of each combination of values of some discrete choices; those that
+    /// are not among the discrete ones are left out.
+    pub fn joint(&self, addresses: &[String]) -> BTreeMap<Vec<String>, f64> {
+        let mut all = BTreeMap::new();
+        for k in &self.kinds {
+            let value =
+                |a: &String| k.discrete.iter().find(|d| d.0 == *a).map(|d| format!("{}", d.1));
+            *all.entry(addresses.iter().filter_map(value).collect()).or_default() += k.probability;
+        }
+        all
+    }
+
+    /// Returns the probability that a continuous choice is below `x`.
+    pub fn below(&self, address: &str, x: f64) -> f64 {
+        let below = |k: &Kind| match &k.continuous {
+            Continuous::Gaussian(all, g) => {
+                let i = all.iter().position(|a| a == address);
+                i.map_or(0.0, |i| phi((x - g.mean[i]) / g.sd(i)))
+            }
+            Continuous::Grid(_, grid) => grid.below(x),
+            Continuous::Quarters(_, steps) => steps.below(x),
+            Continuous::None => 0.0,
+        };
+        let possible = self.kinds.iter().filter(|k| k.probability > 0.0);
+        possible.map(|k| k.probability * below(k)).sum()
     }
 
     pub fn probabilities(&self) -> Vec<f64> {

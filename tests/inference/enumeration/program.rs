@@ -35,6 +35,7 @@ pub enum Dist {
     /// Uniform over the whole numbers from 0 to this one.
     Uniform(Expr),
     Normal(Expr, Expr),
+    Beta(f64, f64),
     Poisson(Expr),
 }
 
@@ -46,6 +47,8 @@ pub enum Right {
     Call(usize, Vec<Expr>),
     /// A call of a memoised function (`mem`).
     Memo(usize, Expr),
+    /// A call of a recursive function, as an index into [`Program::recursions`].
+    Recursion(usize),
     /// A conditional whose branches may draw.
     Branch(Expr, Body, Body),
 }
@@ -69,6 +72,18 @@ pub struct Function {
     pub body: Body,
 }
 
+/// A function that calls itself with the next number while `again` holds: its value is then `step`
+/// plus that of the call, otherwise `stop`.
+#[derive(Clone, Debug)]
+pub struct Recursion {
+    pub name: String,
+    pub param: Id,
+    pub defs: Vec<Def>,
+    pub again: Expr,
+    pub step: Expr,
+    pub stop: Expr,
+}
+
 #[derive(Clone, Debug)]
 pub enum Effect {
     /// A named observation of a number (truth values are 0 and 1), with an optional
@@ -83,7 +98,10 @@ pub enum Item {
     /// The definition of a function, or of a memoised one, by index.
     Function(usize),
     Memo(usize),
+    Recursion(usize),
     Def(Def),
+    /// A prediction: nothing reads it, and no state contains it.
+    Predict(Id, Dist),
     /// A loop with a number of iterations; its draws are keyed by the iteration.
     Loop(usize, Vec<Def>, Vec<Effect>),
     Effect(Effect),
@@ -95,6 +113,7 @@ pub struct Program {
     pub names: Vec<String>,
     pub functions: Vec<Function>,
     pub memos: Vec<Function>,
+    pub recursions: Vec<Recursion>,
     pub items: Vec<Item>,
 }
 
@@ -102,6 +121,36 @@ impl Program {
     pub fn name(&mut self, text: &str) -> Id {
         self.names.push(format!("{text}{}", self.names.len()));
         self.names.len() - 1
+    }
+
+    /// Whether anything is observed or weighed.
+    pub fn has_effects(&self) -> bool {
+        self.items.iter().any(|i| match i {
+            Item::Effect(_) => true,
+            Item::Loop(_, _, effects) => !effects.is_empty(),
+            _ => false,
+        })
+    }
+
+    /// Returns the addresses of the choices whose values are recorded, by item: those of the top
+    /// level, of loops, and predictions.
+    pub fn recorded(&self) -> Vec<String> {
+        let mut all = Vec::new();
+        for item in &self.items {
+            match item {
+                Item::Def(Def::Draw(n, _)) | Item::Predict(n, _) => {
+                    all.push(format!("@{}", self.names[*n]));
+                }
+                Item::Loop(passes, defs, _) => {
+                    for d in defs {
+                        let Def::Draw(n, _) = d else { continue };
+                        all.extend((0..*passes).map(|i| format!("@{}[{i}]", self.names[*n])));
+                    }
+                }
+                _ => {}
+            }
+        }
+        all
     }
 
     fn list(&self, all: &[Expr]) -> String {
@@ -137,6 +186,7 @@ impl Program {
             Dist::Categorical(w) => format!("categorical([{}])", self.list(w)),
             Dist::Uniform(last) => format!("uniform_discrete(0, {})", self.expr(last)),
             Dist::Normal(m, s) => format!("normal({}, {})", self.expr(m), self.expr(s)),
+            Dist::Beta(a, b) => format!("beta({a:?}, {b:?})"),
             Dist::Poisson(r) => format!("poisson({})", self.expr(r)),
         }
     }
@@ -153,6 +203,7 @@ impl Program {
                         format!("{}({})", self.functions[*f].name, self.list(args))
                     }
                     Right::Memo(f, arg) => format!("{}({})", self.memos[*f].name, self.expr(arg)),
+                    Right::Recursion(f) => format!("{}(0)", self.recursions[*f].name),
                     Right::Branch(c, a, b) => {
                         format!(
                             "if {} {{ {} }} else {{ {} }}",
@@ -215,7 +266,21 @@ impl Display for Program {
                         self.body(&g.body)
                     )?;
                 }
+                Item::Recursion(i) => {
+                    let g = &self.recursions[*i];
+                    let (name, k) = (&g.name, &self.names[g.param]);
+                    let defs: String =
+                        g.defs.iter().map(|d| self.def(d, false, false) + " ").collect();
+                    let [again, step, stop] = [&g.again, &g.step, &g.stop].map(|e| self.expr(e));
+                    writeln!(
+                        f,
+                        "fn {name}({k}) {{ {defs}if {again} {{ {step} + {name}({k} + 1) }} else {{ {stop} }} }}"
+                    )?;
+                }
                 Item::Def(d) => writeln!(f, "{}", self.def(d, false, true))?,
+                Item::Predict(n, d) => {
+                    writeln!(f, "predict {} ~ {};", self.names[*n], self.dist(d))?;
+                }
                 Item::Effect(e) => writeln!(f, "{}", self.effect(e))?,
                 Item::Loop(n, defs, effects) => {
                     let mut inner = String::new();
