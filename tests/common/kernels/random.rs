@@ -40,9 +40,8 @@ pub const SUMMING: &[&str] = &[
     "mala($continuous, marginal = %);",
     "nuts($continuous, max_depth = 2, marginal = %);",
 ];
-/// Joint draws of finite choices, given the rest; they join [`ALL`] when the kernel exists.
-pub const EXACT: [&str; 2] = ["exact($finite);", "exact(%);"];
-pub const EXACT_EXISTS: bool = false;
+/// Joint draws of finite choices, given the rest.
+pub const EXACT: &[&str] = &["exact($finite);", "exact(%);"];
 /// All of them.
 pub const ALL: &[&[&str]] =
-    &[ANY, DISCRETE, CONTINUOUS, REVERSIBLE, SUMMING, &["delayed(mh(one(@**)), @y);"]];
+    &[ANY, DISCRETE, CONTINUOUS, REVERSIBLE, SUMMING, EXACT, &["delayed(mh(one(@**)), @y);"]];

@@ -4,7 +4,7 @@
 use super::posterior::Posterior;
 use super::program::{Def, Dist, Effect, Item, Program};
 use crate::common::kernels::random::{
-    ANY, CONTINUOUS, DISCRETE, EXACT, EXACT_EXISTS, REVERSIBLE, SUMMING,
+    ANY, CONTINUOUS, DISCRETE, EXACT, REVERSIBLE, SUMMING,
 };
 use pcadlang_numerics::rng::Stream;
 
@@ -103,7 +103,7 @@ pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream
         let (k, (site, _)) = (SUMMING[rng.index(SUMMING.len())], sites[rng.index(sites.len())]);
         all.push(Plan::of(format!("{} alone", class(k)), k.replace('%', site)));
     }
-    if EXACT_EXISTS && !sites.is_empty() {
+    if !sites.is_empty() {
         let (k, a, b) = (EXACT[rng.index(2)], rng.index(sites.len()), rng.index(sites.len()));
         let both = [sites[a].0.as_str(), sites[b].0.as_str()].join(" + ");
         all.push(Plan::of(class(k), k.replace('%', &both)));
