@@ -253,7 +253,6 @@ impl Registered {
         if self.scope.pick != Pick::Each {
             return None;
         }
-        self.sweep = None;
         let sweep = self.sweep_in(trace);
         let is_last = |t: &Target| Some(trace.address_hash(*t)) == after;
         let last = after.and_then(|_| sweep.order.iter().position(is_last));
