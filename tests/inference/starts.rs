@@ -98,9 +98,15 @@ fn a_chain_starts_without_what_contradicts_the_observations() {
         let done = Model::from_text(text).unwrap().run(&options, 2, 2).unwrap();
         for (name, exact) in [("k", 0.5), ("x1", 0.25), ("x2", 0.25)] {
             let s = done.quantity(name).unwrap().summary;
-            assert!((s.mean - exact).abs() < 5.0 * s.mcse_mean + 0.005, "seed {seed}: {name} {s:?}");
+            assert!(
+                (s.mean - exact).abs() < 5.0 * s.mcse_mean + 0.005,
+                "seed {seed}: {name} {s:?}"
+            );
         }
         let said = &done.warnings[0];
-        assert!(said.contains("started without what `force` sets") && said.contains("@f"), "{said}");
+        assert!(
+            said.contains("started without what `force` sets") && said.contains("@f"),
+            "{said}"
+        );
     }
 }

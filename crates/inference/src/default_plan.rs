@@ -158,34 +158,46 @@ impl Program {
     }
 
     /// The continuous choices about which a derivative of the density says nothing, as
-    /// selections; `None` if there is no derivative at all.
+    /// selections; `None` if there is no derivative at all, or too many such choices.
     fn rough(&mut self) -> Option<BTreeSet<String>> {
-        let mut rough = BTreeSet::new();
-        // Choices whose derivative did not inform, and those that one did.
-        let (mut flat, mut informed) = (BTreeSet::new(), BTreeSet::new());
-        let mut any = false;
+        // Choices without a derivative, those whose derivative did not inform in some draw, and
+        // those that one did inform about.
+        let (mut rough, mut flat, mut informed) =
+            (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
+        let (mut any, mut asked) = (false, 0);
         for trace in &mut self.draws {
-            let targets = of_kind(trace, ChoiceKind::Continuous);
-            let mut smooth = targets.clone();
-            if let Err(e) = trace.gradient(&targets, 1.0, &mut Vec::new()) {
+            let mut targets = of_kind(trace, ChoiceKind::Continuous);
+            if let Err(e) = gradient(trace, &targets, 1.0) {
+                // Another draw may have one.
                 if e.is_recoverable() {
                     continue;
                 }
                 if targets.len() > FEW {
                     return None;
                 }
-                smooth.retain(|t| trace.gradient(&[*t], 1.0, &mut Vec::new()).is_ok());
-                let names = targets.iter().filter(|t| !smooth.contains(t));
-                rough.extend(names.map(|t| pattern(&trace.address(*t))));
+                let (smooth, none): (Vec<_>, Vec<_>) =
+                    targets.iter().partition(|t| gradient(trace, &[**t], 1.0).is_ok());
+                rough.extend(none.into_iter().map(|t: Target| pattern(&trace.address(t))));
+                targets = smooth;
             }
-            any |= !smooth.is_empty();
-            for t in smooth.into_iter().take(FEW) {
+            let (Ok(with), Ok(without)) =
+                (gradient(trace, &targets, 1.0), gradient(trace, &targets, 0.0))
+            else {
+                continue;
+            };
+            any |= !targets.is_empty();
+            let mut begin = 0;
+            for t in targets {
+                let size = trace.free_to_move(t).map_or(0, |(y, _)| y.len());
+                let own = begin..begin + size;
+                begin += size;
                 let name = pattern(&trace.address(t));
-                if !informed.contains(&name) {
-                    match informs(trace, t) {
-                        Some(true) => drop(informed.insert(name)),
-                        Some(false) => drop(flat.insert(name)),
-                        None => {}
+                if with.get(own.clone()) != without.get(own) {
+                    informed.insert(name);
+                } else if asked < FEW && !flat.contains(&name) {
+                    asked += 1;
+                    if responds(trace, t) {
+                        flat.insert(name);
                     }
                 }
             }
@@ -284,24 +296,19 @@ fn pattern(address: &Address) -> String {
     text
 }
 
-/// Whether the derivative of the likelihood with respect to a choice is not 0; `None` if the
-/// likelihood does not change with it either.
-fn informs(trace: &mut Trace, t: Target) -> Option<bool> {
-    let gradient = |trace: &Trace, power| {
-        let mut g = Vec::new();
-        trace.gradient(&[t], power, &mut g).ok().map(|()| g)
-    };
-    let (with, without) = (gradient(trace, 1.0)?, gradient(trace, 0.0)?);
-    if with != without {
-        return Some(true);
-    }
-    let draws = Draws { key: StreamKey::new(0, 0, Purpose::MIX), step: 0, substream: 0 };
-    let changes = |trace: &mut Trace, substream| {
-        let draws = Draws { substream, ..draws };
+fn gradient(trace: &Trace, targets: &[Target], power: f64) -> TraceResult<Vec<f64>> {
+    let mut g = Vec::new();
+    trace.gradient(targets, power, &mut g).map(|()| g)
+}
+
+/// Whether the likelihood changes with a choice.
+fn responds(trace: &mut Trace, t: Target) -> bool {
+    let key = StreamKey::new(0, 0, Purpose::MIX);
+    (0..4).any(|substream| {
+        let draws = Draws { key, step: 0, substream };
         let changed = trace.propose(&[(t, Change::Resample)], draws);
         let changed = changed.is_ok_and(|w| w.log_likelihood != 0.0 && !w.log_likelihood.is_nan());
         trace.rollback();
         changed
-    };
-    (0..4).any(|i| changes(trace, i)).then_some(false)
+    })
 }

@@ -3,9 +3,7 @@
 
 use super::posterior::Posterior;
 use super::program::{Def, Dist, Effect, Item, Program};
-use crate::common::kernels::random::{
-    ANY, CONTINUOUS, DISCRETE, EXACT, REVERSIBLE, SUMMING,
-};
+use crate::common::kernels::random::{ANY, CONTINUOUS, DISCRETE, EXACT, REVERSIBLE, SUMMING};
 use pcadlang_numerics::rng::Stream;
 
 /// Statements, the declarations of kernels that they need, and the class in which their

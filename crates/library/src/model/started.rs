@@ -22,10 +22,7 @@ impl Model {
     /// # Errors
     /// If none could start, or one failed later.
     #[doc(hidden)]
-    pub fn started(
-        &self,
-        results: Vec<Result<ChainResult, ChainError>>,
-    ) -> Result<Started, Error> {
+    pub fn started(&self, results: Vec<Result<ChainResult, ChainError>>) -> Result<Started, Error> {
         let (all, mut first) = (results.len(), None);
         let mut started = Started { chains: vec![], places: vec![], warnings: vec![] };
         for (i, result) in results.into_iter().enumerate() {
