@@ -3,6 +3,7 @@
 //! whose members appear and vanish.
 
 use crate::common::*;
+use pcadlang::{Model, RunOptions};
 
 /// Asserts that nearly all draws of a continuous quantity differ from each other.
 fn assert_fresh(what: &str, draws: &[f64]) {
@@ -109,8 +110,6 @@ fn sweeps_move_every_member() {
     }
 }
 
-/// An interrupted sweep whose members have changed continues where it was: see also
-/// [`crate::resume`].
 #[test]
 fn three_coupled_coins() {
     let text = "assume a ~ flip(0.5);
@@ -222,7 +221,7 @@ fn vague_priors_start_and_agree_with_quadrature() {
 fn choices_without_a_derivative_are_moved_by_slice() {
     let text = "assume x ~ normal(0, 2); assume m ~ normal(0, 1);
          observe normal(floor(x), 0.3) = 1 as y; observe normal(m, 1) = 1 as z;";
-    let model = pcadlang::Model::from_text(text).unwrap();
+    let model = Model::from_text(text).unwrap();
     let plan = model.plan().unwrap().1.unwrap();
     assert!(plan.contains("nuts($continuous - @x); slice(each(@x));"), "{plan}");
     let weight = |x: f64| normal_pdf(x, 0.0, 2.0) * normal_pdf(x.floor(), 1.0, 0.3);
@@ -234,4 +233,23 @@ fn choices_without_a_derivative_are_moved_by_slice() {
     let d = run(text, 2, 4);
     assert_mean("x", &d["x"], mean, 0.1);
     assert_mean("m", &d["m"], 0.5, 0.1);
+}
+
+/// Single-site moves cannot leave a mode of choices that depend on each other, and are said to
+/// be stuck; those of a choice that has no other value are not.
+#[test]
+fn choices_that_never_move_although_they_could() {
+    let text = "assume a ~ flip(0.5); assume b ~ flip(if a { 0.9999999 } else { 0.0000001 });
+         assume c ~ flip(if b { 1 } else { 0 });
+         observe flip(if c { 0.6 } else { 0.4 }) = true as o;
+         infer { repeat 300 { gibbs(each($finite)); } }";
+    let options = RunOptions { seed: 1, sites: true, ..RunOptions::default() };
+    let posterior = Model::from_text(text).unwrap().run(&options, 1, 1).unwrap();
+    let stuck: Vec<&str> = posterior.chains[0]
+        .sites
+        .iter()
+        .filter(|s| s.is_stuck())
+        .map(|s| &*s.address)
+        .collect();
+    assert_eq!(stuck, ["@a"]);
 }

@@ -162,7 +162,9 @@ mod tests {
 
     #[test]
     fn kernels_that_do_nothing_and_short_runs() {
-        assert!(warnings(&[], &[], &[kernel(500, 0, 0)], 2)[0].contains("none of 500"));
+        assert!(warnings(&[], &[], &[kernel(500, 0, 0)], 2)[0].contains("only costs time"));
+        let stuck = KernelStats { possible: 3, ..kernel(500, 0, 0) };
+        assert!(warnings(&[], &[], &[stuck], 2)[0].contains("other values are possible"));
         assert!(warnings(&[], &[], &[kernel(500, 0, 400)], 2)[0].contains("400 of 500"));
         assert_eq!(warnings(&[], &[], &[kernel(100, 0, 100)], 2), [""; 0], "too few to judge");
         assert!(

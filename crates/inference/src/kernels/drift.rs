@@ -55,6 +55,8 @@ pub struct Drift {
     spreads: FxHashMap<u64, Spread>,
     /// By the hash of their addresses: the shape of choices that move together.
     shapes: FxHashMap<u64, Shape>,
+    /// Whether a joint move of warm-up made choices appear or vanish.
+    structural: bool,
 }
 
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -121,6 +123,10 @@ impl Move {
     }
 }
 
+/// The probability that a joint move has the shape of the posterior, if moves may change which
+/// choices exist: those that do so must not have one, as the shape belongs to the choices.
+const SHAPED: f64 = 0.75;
+
 impl Drift {
     /// A kernel for these choices. Without a scale, one is adapted in warm-up.
     pub fn new(scope: SiteSelection, scale: Option<f64>) -> Self {
@@ -131,6 +137,7 @@ impl Drift {
             scales: FxHashMap::default(),
             spreads: FxHashMap::default(),
             shapes: FxHashMap::default(),
+            structural: false,
         }
     }
 
@@ -227,11 +234,12 @@ impl Kernel for Drift {
     }
 
     fn save(&self, _: &Trace) -> Vec<u8> {
-        pack(&(in_order(&self.scales), in_order(&self.spreads), in_order(&self.shapes)))
+        let (scales, spreads) = (in_order(&self.scales), in_order(&self.spreads));
+        pack(&(scales, spreads, in_order(&self.shapes), self.structural))
     }
 
     fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
-        (self.scales, self.spreads, self.shapes) = unpack(state)?;
+        (self.scales, self.spreads, self.shapes, self.structural) = unpack(state)?;
         holds(self.shapes.values().all(Shape::fits), "drift")
     }
 
@@ -250,7 +258,9 @@ impl Kernel for Drift {
         let frees: Vec<_> = targets.iter().map(|t| trace.free_to_move(*t)).collect();
         let shape = joint.then(|| shape_key(trace, &targets, &frees));
         let dimension: usize = frees.iter().flatten().map(|(y, _)| y.len()).sum();
-        let along = shape.and_then(|k| self.shapes.get(&k)).and_then(|s| s.step(&mut rng));
+        let shaped = !self.structural || rng.uniform() < SHAPED;
+        let along = shape.filter(|_| shaped).and_then(|k| self.shapes.get(&k));
+        let along = along.and_then(|s| s.step(&mut rng));
         // A shape of another size can only come from a checkpoint.
         let along = along.filter(|a| a.len() == dimension);
         // A random length, independent of the state.
@@ -287,6 +297,12 @@ impl Kernel for Drift {
                 for (t, m) in moves.iter().filter(|(t, _)| !trace.was_removed(*t)) {
                     ratio += m.back(trace, *t).unwrap_or(f64::NEG_INFINITY) - m.old_term;
                 }
+                let structural = w.appeared + w.vanished > 0;
+                // The way back would have another shape.
+                if structural && along.is_some() {
+                    ratio = f64::NEG_INFINITY;
+                }
+                self.structural |= structural && joint && at.adapting && self.adaptive;
                 accept_or_reject(trace, ratio, &mut rng)
             }
         };
