@@ -36,7 +36,7 @@ const UNIFORM: u64 = 3;
 const FAR: (f64, f64) = (100.0, 20.0);
 /// The most selections that `slice` has by name; with more it moves all continuous choices.
 const NAMED: usize = 4;
-/// The number of draws whose finite choices are tabulated.
+/// The number of draws that are examined where that costs more.
 const FEW_DRAWS: usize = 3;
 /// The most choices that are examined one by one.
 const FEW: usize = 50;
@@ -203,6 +203,18 @@ impl Program {
             }
         }
         rough.extend(flat.difference(&informed).cloned());
+        for trace in self.draws.iter_mut().take(FEW_DRAWS) {
+            let stepped = trace.with_steps();
+            if stepped.is_empty() {
+                continue;
+            }
+            for t in of_kind(trace, ChoiceKind::Continuous) {
+                let reach = trace.dependents(t);
+                if reach.terms.iter().any(|d| stepped.contains(&d.address)) {
+                    rough.insert(pattern(&trace.address(t)));
+                }
+            }
+        }
         (any && rough.len() <= NAMED).then_some(rough)
     }
 

@@ -149,6 +149,12 @@ pub trait Likelihood: fmt::Debug + Send + Sync {
     fn gradient(&self, _observed: &Value) -> Option<Adjoint> {
         None
     }
+
+    /// Whether the density has steps, so that [`Likelihood::gradient`] is that of a smoothed
+    /// one: trajectories that follow it are mostly rejected.
+    fn has_steps(&self) -> bool {
+        false
+    }
     /// Samples an observation given the scene, in the form of the observed one and with
     /// the same parts missing. `None` if it has no sampler.
     ///

@@ -244,9 +244,22 @@ impl Trace {
         }
     }
 
+    /// Returns the addresses of the observations whose density has steps (see
+    /// [`Likelihood::has_steps`]).
+    #[doc(hidden)]
+    pub fn with_steps(&self) -> Vec<Address> {
+        let stepped = self.likelihoods_at().filter(|(_, l, _)| l.has_steps());
+        stepped.map(|(n, ..)| self.graph.address(&self.code, n)).collect()
+    }
+
     /// Iterates over the likelihoods that are not distributions, with the value observed
     /// under each.
     fn likelihoods(&self) -> impl Iterator<Item = (&dyn Likelihood, &Value)> {
+        self.likelihoods_at().map(|(_, l, observed)| (l, observed))
+    }
+
+    /// The same, with the nodes of the observations.
+    fn likelihoods_at(&self) -> impl Iterator<Item = (u32, &dyn Likelihood, &Value)> {
         self.scored_nodes().filter_map(|n| {
             let Op::Observe { dist: DistSpec::Value(o), value, .. } = self.graph.op(&self.code, n)
             else {
@@ -254,7 +267,9 @@ impl Trace {
             };
             let frame = self.graph.nodes[n as usize].frame;
             let Value::Likelihood(l) = self.graph.value(&self.code, frame, *o) else { return None };
-            Some((&**l, self.graph.observed_value(&self.code, n, *value, &mut node::Deps::new())))
+            let observed =
+                self.graph.observed_value(&self.code, n, *value, &mut node::Deps::new());
+            Some((n, &**l, observed))
         })
     }
 

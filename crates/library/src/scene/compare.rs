@@ -430,6 +430,10 @@ impl Likelihood for MaskOf {
         Some(self.prepared(observed).and_then(draw))
     }
 
+    fn has_steps(&self) -> bool {
+        !self.partial
+    }
+
     /// With respect to the view.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let prepared = self.prepared(observed).ok()?;
@@ -506,6 +510,10 @@ impl Likelihood for DepthOf {
             Ok(Value::object(DepthValue::new(map)))
         };
         Some(self.prepared(observed).and_then(draw))
+    }
+
+    fn has_steps(&self) -> bool {
+        true
     }
 
     /// With respect to the view.
