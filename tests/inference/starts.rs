@@ -23,11 +23,13 @@ fn a_chain_that_cannot_start_leaves_the_others_their_draws() {
     let done = run(RARE, 1, 12).unwrap();
     let ran = done.chains.len();
     assert!(ran > 1 && ran < 12, "{ran} of 12 chains started");
-    assert_eq!((done.draws.len(), done.warnings.len()), (ran, 12 - ran));
+    assert_eq!((done.draws.len(), done.warnings.len()), (ran, 1));
     let y = done.quantity("y").unwrap();
     assert!(y.chains.iter().all(|c| c.len() == 200) && y.summary.r_hat > 0.9);
     let said = &done.warnings[0];
-    for part in [" of 12 could not start and is left out: all 1000 draws", "@seen", ":2:14)"] {
+    for part in
+        ["chains ", " of 12 could not start and are left out: all 1000 draws", "@seen", ":2:14)"]
+    {
         assert!(said.contains(part), "{said} has no {part}");
     }
 }
@@ -98,9 +100,15 @@ fn a_chain_starts_without_what_contradicts_the_observations() {
         let done = Model::from_text(text).unwrap().run(&options, 2, 2).unwrap();
         for (name, exact) in [("k", 0.5), ("x1", 0.25), ("x2", 0.25)] {
             let s = done.quantity(name).unwrap().summary;
-            assert!((s.mean - exact).abs() < 5.0 * s.mcse_mean + 0.005, "seed {seed}: {name} {s:?}");
+            assert!(
+                (s.mean - exact).abs() < 5.0 * s.mcse_mean + 0.005,
+                "seed {seed}: {name} {s:?}"
+            );
         }
         let said = &done.warnings[0];
-        assert!(said.contains("started without what `force` sets") && said.contains("@f"), "{said}");
+        assert!(
+            said.contains("started without what `force` sets") && said.contains("@f"),
+            "{said}"
+        );
     }
 }

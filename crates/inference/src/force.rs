@@ -78,7 +78,12 @@ impl Forced {
     }
 
     /// Checks that some state has the choice of each statement, and that its value fits there.
-    fn check(&self, code: &Arc<Code>, key: StreamKey, limits: &Limits) -> Result<(), Box<RunError>> {
+    fn check(
+        &self,
+        code: &Arc<Code>,
+        key: StreamKey,
+        limits: &Limits,
+    ) -> Result<(), Box<RunError>> {
         let mut open: Vec<_> = self.statements.iter().map(|s| (s, Known::Nothing)).collect();
         let mut last = None;
         for step in 0..RETRIES {

@@ -21,8 +21,7 @@ pub fn warnings(
     chains: usize,
 ) -> Vec<String> {
     let mut out = Vec::new();
-    if let Some(q) =
-        quantities.iter().find(|q| q.is_stuck() && q.drawn().all(|c| c.len() >= STUCK))
+    if let Some(q) = quantities.iter().find(|q| q.is_stuck() && q.drawn().all(|c| c.len() >= STUCK))
     {
         out.push(format!(
             "the chains disagree: {} never moved in any chain, and the chains have different \

@@ -313,15 +313,9 @@ impl Program {
             Ok(compiled) => {
                 let hash = hash_of(&self.loaded, &self.sources, &self.sets);
                 let (reach, limits, data_hash) = (self.reach, self.limits, data_hash.into_inner());
-                Ok(Model {
-                    compiled,
-                    sources: self.sources,
-                    text: self.text,
-                    hash,
-                    data_hash,
-                    reach,
-                    limits,
-                })
+                let (sources, text) = (self.sources, self.text);
+                let model = Model { compiled, sources, text, hash, data_hash, reach, limits };
+                model.uses_no_missing_entry().map(|()| model)
             }
             Err(diagnostics) => Err(Error { diagnostics, sources: self.sources }),
         }
