@@ -498,8 +498,11 @@ fn missing_entries_have_a_line_and_a_column() {
         )
     };
     f.write("used.pcad", program("observe normal(b * d.x[i], 1) = d.y[i] as y;"));
-    for command in ["check", "run"] {
-        f.refuses(&[command, "used.pcad"], "d.csv, line 3, column 2: the entry of `y` is empty");
+    f.write("compared.pcad", program("factor(if d.y[i] == 2.1 { 1 } else { 0 });"));
+    for (command, file) in
+        [("check", "used.pcad"), ("run", "used.pcad"), ("check", "compared.pcad")]
+    {
+        f.refuses(&[command, file], "d.csv, line 3, column 2: the entry of `y` is empty");
     }
     let known = "if not is_missing(d.y[i]) { observe normal(b * d.x[i], 1) = d.y[i] as y; }";
     f.write("known.pcad", program(known));

@@ -71,6 +71,8 @@ fn parts_of_arrays_and_values_that_depend_on_choices_are_forced() {
     let whole = "assume z ~ iid(normal(0, 1), 2); force @z = [4, 5]; observe normal(sum(z), 1) = 2;
          infer { repeat 2 { collect z; } }";
     assert_eq!(first(whole, 3, 1, "z[1]"), [5.0]);
+    let e = run(&whole.replace("[4, 5]", "[4]"), 1, 1).unwrap_err();
+    assert!(e.contains("@z cannot be [4]: it does not fit"), "{e}");
 }
 
 #[test]

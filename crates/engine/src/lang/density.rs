@@ -86,8 +86,14 @@ pub(crate) fn score(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
         Value::List(xs) => sum_scores(xs.len(), |i| {
             xs[i].to_datum().map(|x| dist.log_density(&x)).ok_or_else(|| {
                 let (name, got) = (dist.name(), xs[i].type_name());
-                Fault::type_error(format!("element {i}: a value of `{name}` cannot be {got}"))
-                    .with_hint("is_missing(x) tells whether a value is missing")
+                let fault =
+                    Fault::type_error(format!("element {i}: a value of `{name}` cannot be {got}"));
+                match xs[i] {
+                    Value::Unit => {
+                        fault.with_hint("is_missing(x) tells which elements are missing")
+                    }
+                    _ => fault,
+                }
             })
         }),
         Value::Array(xs) => Ok(Score::One(dist.log_density(&Datum::Vec(Arc::clone(xs))))),
