@@ -461,3 +461,53 @@ fn checks_look_into_files() {
     f.write("gone.pcad", "data d = csv(\"gone.csv\"); observe normal(80, 9) = d.height;");
     f.refuses(&["check", "gone.pcad"], "cannot read gone.csv");
 }
+
+/// A chain that finds no state is named in the report, and the others keep their draws.
+#[test]
+fn chains_that_cannot_start_are_told() {
+    let f = Folder::new("cannot-start");
+    f.write(
+        "rare.pcad",
+        "assume x ~ flip(0.001); assume y ~ normal(0, 1); observe normal(y, 1) = 1;
+         observe flip(if x { 1 } else { 0 }) = true as seen;
+         infer { repeat 100 { drift(@y); collect y; } }",
+    );
+    let done = f.succeeds(&["run", "rare.pcad", "--chains", "8", "--seed", "1", "--out", "out"]);
+    let (summary, run) = (json(&f, "out/summary.json"), json(&f, "out/run.json"));
+    let warning = summary["warnings"][0].as_str().unwrap();
+    assert!(
+        warning.contains(" of 8 could not start") && warning.contains("rare.pcad:2:18"),
+        "{warning}"
+    );
+    assert!(done.out.contains("could not start"), "{}", done.out);
+    let started = run["chains"].as_array().unwrap().len();
+    assert!(started > 1 && started < 8, "{started}");
+    assert!(summary["quantities"]["y"]["r_hat"].is_number(), "{summary}");
+    f.succeeds(&["report", "out"]);
+}
+
+/// `check` says where an entry is missing, as does `run`; columns that are not read do not matter.
+#[test]
+fn missing_entries_have_a_line_and_a_column() {
+    let f = Folder::new("missing-entries");
+    f.write("d.csv", "x,y,z\n1,2.1,a\n2,,NA\n3,6.2,\"1,5\"\n4,NA,b\n");
+    let program = |observed: &str| {
+        format!(
+            "data d = csv(\"d.csv\"); assume b ~ normal(0, 5);
+             for i in 0 .. len(d.y) {{ {observed} }}"
+        )
+    };
+    f.write("used.pcad", program("observe normal(b * d.x[i], 1) = d.y[i] as y;"));
+    f.write("compared.pcad", program("factor(if d.y[i] == 2.1 { 1 } else { 0 });"));
+    for (command, file) in
+        [("check", "used.pcad"), ("run", "used.pcad"), ("check", "compared.pcad")]
+    {
+        f.refuses(&[command, file], "d.csv, line 3, column 2: the entry of `y` is empty");
+    }
+    let known = "if not is_missing(d.y[i]) { observe normal(b * d.x[i], 1) = d.y[i] as y; }";
+    f.write("known.pcad", program(known));
+    f.succeeds(&["check", "known.pcad"]);
+    f.succeeds(&["run", "known.pcad", "--steps", "200", "--chains", "1", "--out", "known"]);
+    f.write("other.pcad", program("observe normal(b, 1) = d.x[i] as x;"));
+    f.succeeds(&["check", "other.pcad"]);
+}

@@ -161,8 +161,13 @@ impl Forced {
                 return Err(fail(f.span, format!("{address} cannot be {}", value.type_name())));
             };
             if state.stored(target).as_ref() != Some(&datum) {
-                state.propose(&[(target, Change::Set(datum))], draws)?;
+                state.propose(&[(target, Change::Set(datum.clone()))], draws)?;
                 state.commit();
+                // Such as an array of another length, in whose place a draw was made.
+                if state.find(address).and_then(|t| state.stored(t)).as_ref() != Some(&datum) {
+                    let message = format!("{address} cannot be {value}: it does not fit");
+                    return Err(fail(f.span, message));
+                }
             }
         }
         Ok(())

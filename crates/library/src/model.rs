@@ -11,7 +11,9 @@ pub use program::Program;
 pub use started::Started;
 
 use pcadlang_engine::lang::code::Code;
+use pcadlang_engine::lang::error::FaultKind;
 use pcadlang_engine::lang::lower::{Compiled, Export, Report, compile_plan};
+use pcadlang_engine::lang::missing::Missing;
 use pcadlang_engine::lang::plan::Plan;
 use pcadlang_engine::lang::reach::Reach;
 use pcadlang_engine::trace::{Draws, Limits, Trace};
@@ -109,6 +111,18 @@ impl Model {
             .map_err(|e| self.run_error(*e))
     }
 
+    /// Checks by a draw that missing entries of data, if there are any, are not used as values.
+    /// Types cannot tell: programs may ask which entries are missing.
+    fn uses_no_missing_entry(&self) -> Result<(), Error> {
+        if self.code().consts.iter().all(|v| Missing::first_in(v).is_none()) {
+            return Ok(());
+        }
+        match Trace::simulate(Arc::clone(self.code()), Draws::default(), self.limits.clone()) {
+            Err(e) if e.kind == FaultKind::Missing => Err(self.run_error(*e)),
+            _ => Ok(()),
+        }
+    }
+
     /// Returns the inference plan: the program's first `infer` block, or the default
     /// plan. The second part is the text of the default plan, if that is used.
     ///
@@ -191,7 +205,7 @@ pub struct Posterior {
     pub draws: Vec<ChainDraws>,
     /// The last state of each chain, its kernels and its statistics.
     pub chains: Vec<ChainResult>,
-    /// A sentence on each chain that found no state to start from and is left out, or that
+    /// Sentences on chains that found no state to start from and are left out, and on those that
     /// started without what `force` sets.
     pub warnings: Vec<String>,
 }

@@ -87,7 +87,7 @@ pub const STATEMENTS: &[Statement] = &[
     model(
         "force",
         "force @a = v;",
-        "Set a choice at the start of each chain. It keeps its prior density and may move later.",
+        "Set a choice where a chain starts, in the states that have it. It keeps its prior density and may move later.",
         "assume a ~ normal(0, 1); force @a = 2;",
     ),
     model(

@@ -64,7 +64,10 @@ pub(crate) fn score(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
             Ok(dist.element_log_density(i, &x))
         });
     }
-    let nan = || Fault::domain("the observed value is not a number");
+    let nan = || {
+        Fault::domain("the observed value is not a number")
+            .with_hint("leave out values that are missing: if not is_missing(x) { observe … = x; }")
+    };
     match observed {
         Value::Num(x) if x.is_nan() => Err(nan()),
         Value::Array(xs) if xs.iter().any(|x| x.is_nan()) => Err(nan()),
@@ -81,7 +84,17 @@ pub(crate) fn score(dist: &Dist, observed: &Value) -> Result<Score, Fault> {
             Ok(Score::One(dist.log_density(&x)))
         }
         Value::List(xs) => sum_scores(xs.len(), |i| {
-            xs[i].to_datum().map(|x| dist.log_density(&x)).ok_or_else(wrong)
+            xs[i].to_datum().map(|x| dist.log_density(&x)).ok_or_else(|| {
+                let (name, got) = (dist.name(), xs[i].type_name());
+                let fault =
+                    Fault::type_error(format!("element {i}: a value of `{name}` cannot be {got}"));
+                match xs[i] {
+                    Value::Unit => {
+                        fault.with_hint("is_missing(x) tells which elements are missing")
+                    }
+                    _ => fault,
+                }
+            })
         }),
         Value::Array(xs) => Ok(Score::One(dist.log_density(&Datum::Vec(Arc::clone(xs))))),
         Value::Object(_) if tells_nothing(dist) => Ok(Score::One(0.0)),

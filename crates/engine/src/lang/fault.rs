@@ -21,6 +21,8 @@ pub enum FaultKind {
     Cycle,
     /// Two draws at one address.
     Duplicate,
+    /// The use of an entry of a table that has no value.
+    Missing,
     /// A file that cannot be read, and anything else.
     Other,
 }

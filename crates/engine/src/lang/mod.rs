@@ -16,6 +16,7 @@ pub mod key;
 pub mod load;
 pub mod local_density;
 pub mod lower;
+pub mod missing;
 pub mod plan;
 pub mod reach;
 pub mod tape;

@@ -12,8 +12,9 @@ use super::propose::{Constraint, Draws, Pending};
 
 use crate::lang::address::ROOT_HASH;
 use crate::lang::code::{BlockKind, Callee, Code, Op, Operand, SlotFacts};
-use crate::lang::error::{FaultKind, RunError};
+use crate::lang::error::{Fault, FaultKind, RunError};
 use crate::lang::key::Key;
+use crate::lang::missing::Missing;
 use crate::lang::value::Value;
 use pcadlang_numerics::dist::Datum;
 use pcadlang_numerics::num::ExactSum;
@@ -531,6 +532,20 @@ impl Graph {
         self.note(Entry::Side(n, old));
     }
 
+    /// The error of an entry without a value among what a node reads.
+    fn entry_without_value(&self, code: &Code, n: NodeId) -> Option<Fault> {
+        let node = self.nodes.get(n as usize)?;
+        let (mut found, op) = (None, self.op(code, n));
+        if matches!(op, Op::Index { .. } | Op::Call { .. }) {
+            return None;
+        }
+        op.operands(|o| {
+            let entry = Missing::first_in(self.value(code, node.frame, o));
+            found = found.take().or(entry.map(Missing::fault));
+        });
+        found
+    }
+
     /// Builds an error at a node.
     pub fn fail(
         &self,
@@ -570,6 +585,10 @@ impl Graph {
         // anything that depends on it is evaluated.
         let is_impossible = kind == FaultKind::Index && self.prior.value() == f64::NEG_INFINITY;
         let kind = if is_impossible { FaultKind::Domain } else { kind };
+        // A type error of a missing entry says where the entry is.
+        let missing =
+            if kind == FaultKind::Type { self.entry_without_value(code, n) } else { None };
+        let Fault { kind, message, hint } = missing.unwrap_or(Fault { kind, message, hint });
         Box::new(RunError { kind, message, span, address, calls, hint })
     }
 }

@@ -313,16 +313,10 @@ impl Program {
             Ok(compiled) => {
                 let hash = hash_of(&self.loaded, &self.sources, &self.sets);
                 let (reach, limits, data_hash) = (self.reach, self.limits, data_hash.into_inner());
-                Ok(Model {
-                    compiled,
-                    sources: self.sources,
-                    text: self.text,
-                    hash,
-                    data_hash,
-                    reach,
-                    limits,
-                    default_plan: OnceLock::new(),
-                })
+                let (sources, text, default_plan) = (self.sources, self.text, OnceLock::new());
+                let model =
+                    Model { compiled, sources, text, hash, data_hash, reach, limits, default_plan };
+                model.uses_no_missing_entry().map(|()| model)
             }
             Err(diagnostics) => Err(Error { diagnostics, sources: self.sources }),
         }

@@ -1,6 +1,7 @@
 //! Chains that fail: as diagnostics, or as a sentence where the other chains go on.
 
 use super::Model;
+use indexmap::IndexMap;
 use pcadlang_engine::lang::error::RunError;
 use pcadlang_inference::{ChainError, ChainResult, NoStart, StartError};
 use pcadlang_syntax::diag::{Diagnostic, Error, IntoDiagnostic, Severity};
@@ -12,7 +13,7 @@ pub struct Started {
     pub chains: Vec<ChainResult>,
     /// The place of each of them among the chains of the run, from 0.
     pub places: Vec<usize>,
-    /// A sentence on each of the others, and on each that started without what `force` sets.
+    /// Sentences on the others, and on those that started without what `force` sets.
     pub warnings: Vec<String>,
 }
 
@@ -25,32 +26,36 @@ impl Model {
     pub fn started(&self, results: Vec<Result<ChainResult, ChainError>>) -> Result<Started, Error> {
         let (all, mut first) = (results.len(), None);
         let mut started = Started { chains: vec![], places: vec![], warnings: vec![] };
+        // Chains of the same fate share a sentence.
+        let mut fates: IndexMap<String, Vec<String>> = IndexMap::new();
         for (i, result) in results.into_iter().enumerate() {
-            match result {
+            let fate = match result {
                 Ok(mut chain) => {
-                    if let Some(by) = chain.contradicted.take() {
-                        let by = ChainError::Start(StartError::Impossible(by));
-                        started.warnings.push(format!(
-                            "chain {} of {all} started without what `force` sets, with which {}",
-                            i + 1,
-                            in_short(&self.chain_error(by))
-                        ));
-                    }
+                    let by = chain.contradicted.take();
                     started.chains.push(chain);
                     started.places.push(i);
+                    let Some(by) = by else { continue };
+                    let by = self.chain_error(ChainError::Start(StartError::Impossible(by)));
+                    format!("started without what `force` sets, with which {}", in_short(&by))
                 }
                 Err(e) if e.is_of_the_start() => {
                     let e = self.chain_error(e);
-                    started.warnings.push(format!(
-                        "chain {} of {all} could not start and is left out: {}",
-                        i + 1,
-                        in_short(&e)
-                    ));
+                    let fate = format!("could not start and is left out: {}", in_short(&e));
                     first = first.or(Some(e));
+                    fate
                 }
                 Err(e) => return Err(self.chain_error(e)),
-            }
+            };
+            fates.entry(fate).or_default().push((i + 1).to_string());
         }
+        let told = |(fate, chains): (String, Vec<String>)| match &chains[..] {
+            [one] => format!("chain {one} of {all} {fate}"),
+            some => {
+                let fate = fate.replacen(" is left out", " are left out", 1);
+                format!("chains {} of {all} {fate}", some.join(", "))
+            }
+        };
+        started.warnings = fates.into_iter().map(told).collect();
         match first {
             Some(e) if started.chains.is_empty() => Err(e),
             _ => Ok(started),

@@ -5,6 +5,7 @@ use super::{Arg, ArgAdjoints, Args, Row, Type, arg, function, opt};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::key::Key;
+use crate::lang::missing::is_missing;
 use crate::lang::value::{MOST_ELEMENTS, Value};
 use smallvec::smallvec;
 use std::cmp::Ordering;
@@ -209,6 +210,15 @@ pub(super) const TABLE: &[Row] = &[
     function("all", SECTION, BOOLS, Type::Bool, "Whether every element is true.", |a| {
         Ok(Value::Bool(!bools(a)?.contains(&false)))
     })
+    .flat(),
+    function(
+        "is_missing",
+        SECTION,
+        &[arg("x", Type::Any, "A value, or an array of them.")],
+        Type::Any,
+        "Whether a value is missing: an empty or NA field of a CSV file, null of a JSON file, or NaN. Of an array, a bool for each element.",
+        |a| is_missing(a.get(0)),
+    )
     .flat(),
     function(
         "select",

@@ -9,6 +9,7 @@ use super::elementwise::{self, array, array_len, broadcast, mapped, numeric};
 use super::math::pow_slopes;
 use super::{Arg, Args, Derivative, Row, Scalar, Type, arg, function};
 use crate::lang::error::Fault;
+use crate::lang::missing::Missing;
 use crate::lang::value::{MOST_ELEMENTS, Value};
 use std::cmp::Ordering;
 
@@ -169,7 +170,11 @@ fn not(a: &Args) -> Result<Value, Fault> {
 fn equality(a: &Args, wanted: bool) -> Result<Value, Fault> {
     match (a.get(0), a.get(1)) {
         (Value::Num(x), Value::Num(y)) => Ok(Value::Bool((x == y) == wanted)),
-        (x, y) => broadcast(a, x, y, &|x, y| Ok(Value::Bool(equal(x, y) == wanted))),
+        (x, y) => broadcast(a, x, y, &|x, y| match Missing::first_in(x).or(Missing::first_in(y)) {
+            // Neither answer would be right.
+            Some(entry) => Err(entry.fault()),
+            None => Ok(Value::Bool(equal(x, y) == wanted)),
+        }),
     }
 }
 

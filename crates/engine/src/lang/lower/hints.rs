@@ -12,7 +12,7 @@ use pcadlang_syntax::span::Span;
 use std::sync::Arc;
 
 /// Names from other languages and libraries, and their equivalents here.
-const ELSEWHERE: [(&str, &str); 16] = [
+const ELSEWHERE: [(&str, &str); 20] = [
     ("ln", "log"),
     ("length", "len"),
     ("size", "len"),
@@ -25,11 +25,21 @@ const ELSEWHERE: [(&str, &str); 16] = [
     ("power", "**"),
     ("range", "a .. b"),
     ("print", "predict"),
+    ("isnan", "is_missing"),
+    ("is_nan", "is_missing"),
+    ("isna", "is_missing"),
+    ("is_na", "is_missing"),
     ("null", "an array, empty or not"),
     ("None", "an array, empty or not"),
     ("True", "true"),
     ("False", "false"),
 ];
+
+/// Diagnostics by which plans in other languages end, and what to do instead. A chain knows only
+/// its own draws.
+const OF_A_RUN: [&str; 6] = ["ess", "rhat", "r_hat", "acceptance", "snapshot", "converged"];
+const INSTEAD: &str = "a chain does not see the others while it runs: end it by --time or --steps, or \
+                       by elapsed() or steps(); the table at the end has ess and r_hat";
 
 /// Where a name that is unknown at some place is bound.
 enum Elsewhere {
@@ -86,8 +96,9 @@ impl Lowerer<'_> {
             None => {}
         }
         let near = near.map(|n| format!("did you mean `{n}`?"));
+        let of_a_run = OF_A_RUN.contains(&name).then(|| INSTEAD.to_owned());
         let inside = inside.map(|i| format!("did you mean `{i}`?"));
-        if let Some(hint) = inside.or(module).or(called).or(near).or(lives) {
+        if let Some(hint) = inside.or(module).or(called).or(of_a_run).or(near).or(lives) {
             e.hint_also(hint);
         }
     }

@@ -267,9 +267,14 @@ impl Graph {
 
     fn improper(&self, code: &Code, n: NodeId, dist: &Dist) -> Failure {
         let message = format!("`{}` is improper, so it cannot be sampled", dist.name());
-        let hint =
-            "use `drift` on it, observe something that depends on it, or give it a proper prior";
-        self.fail(code, n, FaultKind::Domain, message, Some(hint.into()))
+        // Kernels reject such draws. Here no observation depends on the choice, so that no kernel
+        // could move it either.
+        let proper = match dist.name() {
+            "ordered" => "order numbers of one distribution: ordered(normal(0, 1), 3)",
+            _ => "give it a proper prior, such as normal(0, 10)",
+        };
+        let hint = format!("observe something that depends on it, or {proper}");
+        self.fail(code, n, FaultKind::Domain, message, Some(hint))
     }
 
     fn add_prior(&mut self, score: f64, drawn: bool) {

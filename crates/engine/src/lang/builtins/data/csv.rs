@@ -3,9 +3,10 @@
 //!
 //! The separator is the one of comma, semicolon and tab that is most frequent in the
 //! header. A column holds numbers if all its fields are numbers, otherwise bools if all
-//! are `true` or `false`, otherwise strings. There are no missing values: an empty field
-//! in a column of numbers is an error rather than a NaN that surfaces later.
+//! are `true` or `false`, otherwise strings. Fields of a column of numbers or bools that are
+//! left out, or that are mistakes, are [`Missing`]: only their use is an error.
 
+use crate::lang::missing::{Missing, Why};
 use crate::lang::value::{MOST_ELEMENTS, Record, Value};
 use csv::StringRecord;
 use std::io::Read;
@@ -14,8 +15,40 @@ use std::sync::Arc;
 /// A row and its first byte.
 type Row = (usize, StringRecord);
 
+/// What spreadsheets, R, pandas and other programs write for a missing entry, in small letters.
+const ABSENT: [&str; 12] =
+    ["", "na", "n/a", "#n/a", "#na", "<na>", "null", "none", "nan", "-", ".", "?"];
+/// A column holds numbers if there are at least this many of them for each other text: the
+/// texts are then mistakes.
+const NUMBERS: usize = 3;
+
+/// What a field is on its own.
+#[derive(Clone, Copy)]
+enum Field {
+    Num(f64),
+    Bool(bool),
+    Not(Why),
+}
+
+impl Field {
+    fn of(text: &str) -> Field {
+        let absent = || ABSENT.contains(&&*text.to_ascii_lowercase());
+        match (text.parse::<f64>(), text.parse()) {
+            (Ok(x), _) if x.is_infinite() && text.contains(|c: char| c.is_ascii_digit()) => {
+                Field::Not(Why::Huge)
+            }
+            (Ok(x), _) if x.is_nan() => Field::Not(Why::Absent),
+            (Ok(x), _) => Field::Num(x),
+            (_, Ok(b)) => Field::Bool(b),
+            _ if absent() => Field::Not(Why::Absent),
+            _ if text.replacen(',', ".", 1).parse::<f64>().is_ok() => Field::Not(Why::Comma),
+            _ => Field::Not(Why::Other),
+        }
+    }
+}
+
 /// Parses a table into a record of arrays, one per column.
-pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
+pub(super) fn parse(bytes: &[u8], file: &str) -> Result<Value, String> {
     let text = std::str::from_utf8(bytes)
         .map_err(|e| format!("not UTF-8 text (byte {})", e.valid_up_to()))?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -28,20 +61,26 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
     }
     let rows: Vec<Row> = rows.collect();
     if let Some((at, row)) = rows.iter().find(|(_, row)| row.len() != header.len()) {
+        let commas = row.len() > header.len() && separator(text) == b',';
         return Err(format!(
-            "line {}: {} fields, but the header has {}",
+            "line {}: {} fields, but the header has {}{}",
             line(text, *at),
             row.len(),
-            header.len()
+            header.len(),
+            if commas {
+                "; numbers need a decimal point, and texts with commas quotes"
+            } else {
+                ""
+            }
         ));
     }
-    let mut table = Record::new();
+    let (mut table, file) = (Record::new(), Arc::from(file));
     for (i, name) in header.iter().enumerate() {
         let name = name.trim();
         if name.is_empty() {
             return Err(format!("line 1: column {} has no name", i + 1));
         }
-        if table.insert(Arc::from(name), column(name, i, &rows, text)?).is_some() {
+        if table.insert(Arc::from(name), column(name, i, &rows, (text, &file))).is_some() {
             return Err(format!("line 1: there are two columns `{name}`"));
         }
     }
@@ -49,28 +88,40 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
 }
 
 /// Converts a column to an array.
-fn column(name: &str, i: usize, rows: &[Row], text: &str) -> Result<Value, String> {
-    let fields = || rows.iter().map(|(at, row)| (*at, row.get(i).map_or("", |f| f.trim())));
-    let numbers: Vec<f64> = fields().filter_map(|(_, f)| f.parse().ok()).collect();
-    if let Some((at, _)) = fields().find(|(_, f)| f.parse::<f64>().is_ok_and(f64::is_nan)) {
-        return Err(format!("line {}: column `{name}` is NaN; remove the row", line(text, at)));
+fn column(name: &str, i: usize, rows: &[Row], (text, file): (&str, &Arc<str>)) -> Value {
+    let fields: Vec<Field> = rows.iter().map(|(_, row)| Field::of(written(row, i))).collect();
+    let count = |is: fn(&Field) -> bool| fields.iter().filter(|f| is(f)).count();
+    let numbers = count(|f| matches!(f, Field::Num(_) | Field::Not(Why::Comma | Why::Huge)));
+    let bools = count(|f| matches!(f, Field::Bool(_)));
+    let texts = count(|f| matches!(f, Field::Not(Why::Other)));
+    let is_numbers = numbers >= NUMBERS * (bools + texts);
+    if !is_numbers && numbers + texts > 0 {
+        return Value::List(
+            rows.iter().map(|(_, row)| row.get(i).map_or(Value::Unit, Value::str)).collect(),
+        );
     }
-    if numbers.len() == rows.len() {
-        return Ok(Value::array(numbers));
-    }
-    if let Some((at, _)) = fields().find(|(_, f)| f.is_empty())
-        && fields().all(|(_, f)| f.is_empty() || f.parse::<f64>().is_ok())
-        && !numbers.is_empty()
-    {
-        return Err(format!("line {}: column `{name}` is empty; remove the row", line(text, at)));
-    }
-    let bools: Vec<Value> = fields().filter_map(|(_, f)| f.parse().ok().map(Value::Bool)).collect();
-    if bools.len() == rows.len() {
-        return Ok(Value::List(bools.into()));
-    }
-    Ok(Value::List(
-        rows.iter().map(|(_, row)| row.get(i).map_or(Value::Unit, Value::str)).collect(),
-    ))
+    let (name, mut seen): (Arc<str>, _) = (Arc::from(name), (0, 1));
+    let value = |(field, (at, row)): (&Field, &Row)| match *field {
+        Field::Num(x) => Value::Num(x),
+        Field::Bool(b) if !is_numbers => Value::Bool(b),
+        other => {
+            // Lines are counted from the entry before.
+            seen = (*at, seen.1 + breaks(text.get(seen.0..*at).unwrap_or("")));
+            Value::object(Missing {
+                file: Arc::clone(file),
+                name: Arc::clone(&name),
+                at: (seen.1, i + 1),
+                text: written(row, i).into(),
+                why: if let Field::Not(why) = other { why } else { Why::Other },
+            })
+        }
+    };
+    Value::from_elements(fields.iter().zip(rows).map(value).collect())
+}
+
+/// A field of a row without the space around it.
+fn written(row: &StringRecord, i: usize) -> &str {
+    row.get(i).map_or("", str::trim)
 }
 
 /// The most frequent separator in the header; a comma if there is none.
@@ -116,8 +167,12 @@ fn rows(text: &str, separator: u8) -> Result<Vec<Row>, String> {
 
 /// The line of a byte, counted from 1.
 fn line(text: &str, at: usize) -> usize {
-    let before = text.get(..at).unwrap_or(text).replace("\r\n", "\n");
-    1 + before.matches(['\r', '\n']).count()
+    1 + breaks(text.get(..at).unwrap_or(text))
+}
+
+/// The number of line breaks.
+fn breaks(text: &str) -> usize {
+    text.replace("\r\n", "\n").matches(['\r', '\n']).count()
 }
 
 #[cfg(test)]
@@ -125,7 +180,7 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> String {
-        match parse(text.as_bytes()) {
+        match parse(text.as_bytes(), "t.csv") {
             Ok(v) => v.to_string(),
             Err(e) => e,
         }
@@ -147,10 +202,61 @@ mod tests {
     #[test]
     fn quotes_protect_separators_and_line_ends() {
         assert_eq!(
-            read("a,b\n\"1,5\",\"say \"\"hi\"\"\nthere\"\n"),
-            "{ a: [\"1,5\"], b: [\"say \\\"hi\\\"\\nthere\"] }"
+            read("a,b\n\"1,x\",\"say \"\"hi\"\"\nthere\"\n"),
+            "{ a: [\"1,x\"], b: [\"say \\\"hi\\\"\\nthere\"] }"
         );
         assert_eq!(read("a,b\n\"1\n2\",x\n3\n"), "line 4: 1 fields, but the header has 2");
+    }
+
+    /// The errors of the entries of a table without values.
+    fn entries(text: &str) -> Vec<String> {
+        let Ok(Value::Record(table)) = parse(text.as_bytes(), "t.csv") else { panic!("{text}") };
+        let all = table.values().flat_map(|c| c.passes());
+        all.filter_map(|v| Some(v.downcast::<Missing>()?.fault().message)).collect()
+    }
+
+    #[test]
+    fn entries_without_values_know_where_they_are() {
+        for absent in
+            ["", "  ", "NA", "nan", "NaN", "-nan", "N/A", "#N/A", "NULL", "None", "-", "."]
+        {
+            let text = format!("\u{feff}y;x\r\n{absent};1\r\n\r\n2.5;{absent}\r\n3;2\r\n");
+            let what = match absent.trim() {
+                "" => "is empty".to_owned(),
+                a => format!("is missing (`{a}`)"),
+            };
+            let expected = [
+                format!("t.csv, line 2, column 1: the entry of `y` {what}"),
+                format!("t.csv, line 4, column 2: the entry of `x` {what}"),
+            ];
+            assert_eq!(entries(&text), expected, "{absent}");
+        }
+        let one = |text: &str| entries(text).join("\n");
+        assert_eq!(
+            one("a,b\n\"x\ny\",\"3,5\"\n"),
+            "t.csv, line 2, column 2: the entry of `b` has a comma (`3,5`)"
+        );
+        assert_eq!(
+            one("x;y\n1;3,5\n2;4,5"),
+            [
+                "t.csv, line 2, column 2: the entry of `y` has a comma (`3,5`)",
+                "t.csv, line 3, column 2: the entry of `y` has a comma (`4,5`)"
+            ]
+            .join("\n")
+        );
+        assert_eq!(
+            one("y\n1\n1e400"),
+            "t.csv, line 3, column 1: the entry of `y` is out of range (`1e400`)"
+        );
+        assert_eq!(
+            one("y\n1\n2\n12 kg\n4"),
+            "t.csv, line 4, column 1: the entry of `y` is not a number (`12 kg`), though most of the column are"
+        );
+        assert_eq!(entries("y,z\nNA,1\nNA,2").len(), 2, "a column without any value");
+        assert_eq!(
+            read("ok,n\ntrue,NA\nNA,a\n"),
+            "{ ok: [true, a missing entry], n: [\"NA\", \"a\"] }"
+        );
     }
 
     #[test]
@@ -163,14 +269,16 @@ mod tests {
         assert_eq!(read("x,y\n1,2\n3"), "line 3: 1 fields, but the header has 2");
         assert_eq!(read("x,x\n1,2"), "line 1: there are two columns `x`");
         assert_eq!(read("x,\n1,2"), "line 1: column 2 has no name");
-        assert_eq!(read("x,y\n1,2\n\n,3"), "line 4: column `x` is empty; remove the row");
-        assert_eq!(read("x\n1\nnan"), "line 3: column `x` is NaN; remove the row");
+        assert_eq!(
+            read("x,y\n1,2\n3,5,4"),
+            "line 3: 3 fields, but the header has 2; numbers need a decimal point, and texts with commas quotes"
+        );
         assert_eq!(read("x\n\"1"), "line 2: a quoted field is not closed");
         assert_eq!(
             read("x,y\r\n\"1\n2\",3\r\n\r\n4,\"5\n6,\"\"7\n"),
             "line 5: a quoted field is not closed"
         );
         assert_eq!(read("x,y\r1,2\r \r3"), "line 4: 1 fields, but the header has 2");
-        assert_eq!(parse(&[b'x', 0xff]).unwrap_err(), "not UTF-8 text (byte 1)");
+        assert_eq!(parse(&[b'x', 0xff], "t.csv").unwrap_err(), "not UTF-8 text (byte 1)");
     }
 }

@@ -39,21 +39,21 @@ pub(super) const TABLE: &[Row] = &[
         "csv",
         FILE,
         Type::Record,
-        "A table with a header line: a record of columns, numbers, bools or strings.",
+        "A table with a header line: a record of columns, numbers, bools or strings. Empty, NA and NaN fields are missing entries: see `is_missing`.",
         || Arc::new(Text(csv::parse)),
     ),
     kind("json", FILE, Type::Any, "JSON: objects are records, null is nothing.", || {
-        Arc::new(Text(json::parse))
+        Arc::new(Text(|bytes, _| json::parse(bytes)))
     }),
 ];
 
-/// A format without options.
+/// A format without options, which may name the file.
 #[derive(Debug)]
-struct Text(fn(&[u8]) -> Result<Value, String>);
+struct Text(fn(&[u8], &str) -> Result<Value, String>);
 
 impl DataFormat for Text {
     fn load(&self, file: &str, bytes: &[u8], _: &Options, _: &Beside) -> Result<Value, Fault> {
-        (self.0)(bytes).map_err(|why| unreadable(file, &why))
+        (self.0)(bytes, file).map_err(|why| unreadable(file, &why))
     }
 }
 

@@ -13,6 +13,10 @@ pub(super) fn made<T: Into<Dist>>(made: Result<T, ParamError>) -> Result<Dist, F
 pub(super) fn fault(e: ParamError) -> Fault {
     let fault = Fault::domain(e.to_string());
     match e.rule {
+        "must be positive definite" => fault.with_hint(
+            "some variable is a combination of the others: leave it out, or add a variance of its own, \
+             such as cov + 0.000001 * identity(2)",
+        ),
         rule if rule.starts_with("must be positive") => {
             fault.with_hint("for a positive parameter use half_normal, gamma or lognormal as prior, or exp of a number")
         }

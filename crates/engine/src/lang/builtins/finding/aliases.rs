@@ -28,5 +28,9 @@ pub(in crate::lang::builtins) const ALIASES: &[(&str, &str)] = &[
     ("expit", "inv_logit sigmoid logistic"),
     ("iid", "independent plate shape replicate"),
     ("von_mises", "circular angle"),
+    (
+        "is_missing",
+        "na is.na isna isnan isnull is_nan nan null dropna complete.cases impute imputation",
+    ),
     ("half_cauchy", "halfcauchy positive"),
 ];
