@@ -23,6 +23,7 @@ pub struct Case {
     pub text: String,
     pub posterior: Arc<Posterior>,
     pub records: Option<Records>,
+    pub has_data: bool,
 }
 
 /// The outcome of a check.
@@ -101,7 +102,7 @@ impl Callback for Restart {
 
 /// Checks a plan on a program, over `passes` passes.
 pub fn check(case: &Case, plan: &Plan, passes: u64, seed: u64) -> Said {
-    let (Case { text, posterior, records }, Plan { statements, kernels, .. }) = (case, plan);
+    let (Case { text, posterior, records, .. }, Plan { statements, kernels, .. }) = (case, plan);
     let collected = records.as_ref().map_or("1".to_owned(), Records::collected);
     let plan = format!(
         "{text}

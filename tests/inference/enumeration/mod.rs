@@ -66,7 +66,8 @@ impl Made {
             Made::Wide => Records::of(&program, integration),
         };
         let text = program.to_string();
-        Some((program, Case { text, posterior, records }))
+        let has_data = program.has_effects();
+        Some((program, Case { text, posterior, records, has_data }))
     }
 }
 
@@ -117,7 +118,7 @@ impl Tally {
             _ => "mh(one(@**));".to_owned(),
         };
         self.programs += 1;
-        if let Some(records) = case.records.as_ref().filter(|_| !program.has_effects()) {
+        if let Some(records) = case.records.as_ref().filter(|_| !case.has_data) {
             self.without_data(seed, &model, records);
         }
         let mut rng = StreamKey::new(seed, 0, Purpose::MIX).stream(0, 0, 0);
@@ -161,7 +162,8 @@ impl Tally {
             Said::Failed(e) => self.wrong.push(wrong(&e)),
             Said::Counted(counts, pooled, records, moved) => {
                 let has_moved = moved > 0.0 || case.posterior.likeliest() > 0.999;
-                for (class, pooled) in [(&*plan.class, pooled), ("records", records)] {
+                let recorded = if case.has_data { "records" } else { "records, no data" };
+                for (class, pooled) in [(&*plan.class, pooled), (recorded, records)] {
                     let e = self.classes.entry(class.to_owned()).or_default();
                     e.0.merge(&pooled);
                     (e.1, e.2) = (e.1 + 1, e.2 + u64::from(has_moved));
@@ -200,6 +202,9 @@ impl Tally {
             );
         }
         self.refused.iter().for_each(|(why, n)| println!("refused {n}: {why}"));
+        for w in &self.wrong {
+            println!("wrong: {}", w.lines().take(2).collect::<Vec<_>>().join(" "));
+        }
     }
 }
 
