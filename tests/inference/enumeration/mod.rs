@@ -427,14 +427,15 @@ fn default_plans_reach_the_posterior() {
     let (mut programs, mut far) = (0, Vec::new());
     let seeds = first..first + number("ENUMERATED", 60).min(300);
     for (seed, made) in seeds.flat_map(|s| [(s, Made::Narrow), (s, Made::Wide)]) {
-        let Some((_, Case { text, posterior, .. })) = made.case(seed) else { continue };
-        let model = Model::from_text(&text).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
+        let Some((_, case)) = made.case(seed) else { continue };
+        let text = &case.text;
+        let model = Model::from_text(text).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
         programs += 1;
         let Ok((_, Some(plan))) = model.plan() else {
             far.push(format!("seed {seed}: no plan\n{text}"));
             continue;
         };
-        let distance = check::distance(&text, &plan, &posterior, seed);
+        let distance = check::distance(&case, &plan, seed);
         if distance > 0.1 {
             far.push(format!("seed {seed}: total variation {distance:.2}\n{plan}{text}"));
         }
