@@ -163,7 +163,8 @@ impl Tally {
             Said::Counted(counts, pooled, records, moved) => {
                 let has_moved = moved > 0.0 || case.posterior.likeliest() > 0.999;
                 let recorded = if case.has_data { "records" } else { "records, no data" };
-                for (class, pooled) in [(&*plan.class, pooled), (recorded, records)] {
+                let recorded = case.records.as_ref().map(|_| (recorded, records));
+                for (class, pooled) in [(&*plan.class, pooled)].into_iter().chain(recorded) {
                     let e = self.classes.entry(class.to_owned()).or_default();
                     e.0.merge(&pooled);
                     (e.1, e.2) = (e.1 + 1, e.2 + u64::from(has_moved));
@@ -301,9 +302,9 @@ fn updates_agree(seed: u64, made: Made) -> u64 {
 
 #[test]
 fn short_cuts_of_updates_agree_with_running_everything_again() {
-    for made in [Made::Narrow, Made::Wide] {
-        let compared: u64 = (0..300).map(|seed| updates_agree(seed, made)).sum();
-        assert!(compared > 10_000, "{compared}");
+    for (made, programs) in [(Made::Narrow, 300), (Made::Wide, 150)] {
+        let compared: u64 = (0..programs).map(|seed| updates_agree(seed, made)).sum();
+        assert!(compared > 30 * programs, "{compared}");
     }
 }
 
