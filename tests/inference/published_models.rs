@@ -1,5 +1,6 @@
 //! Twenty published models as everybody writes them, vague priors included: the default
-//! plan must start, and find the posterior means of `published/moments.csv` or warn.
+//! plan must start, and find the posterior means of `published/moments.csv`, or come near
+//! and warn.
 //!
 //! `cargo test --release --test inference published_models:: -- --include-ignored --nocapture`
 //! prints every comparison.
@@ -25,7 +26,8 @@ pub fn moments() -> Vec<(String, String)> {
 const CHAINS: usize = 4;
 
 /// Runs the default plan of a model and compares means: within four standard errors of both
-/// together, ours being at most a quarter of the standard deviation.
+/// together, ours being at most a quarter of the standard deviation. A run that warns may be
+/// further off, but by no more than one standard deviation.
 fn right_or_warned(name: &str) {
     let text = std::fs::read_to_string(format!("{FOLDER}/{name}.pcad")).unwrap();
     assert!(!text.contains("infer"), "{name} should leave the plan to the engine");
@@ -35,7 +37,7 @@ fn right_or_warned(name: &str) {
     let posterior = model.run(&options, CHAINS, 2).unwrap_or_else(|e| panic!("{name}: {e}"));
     let seconds = begun.elapsed().as_secs_f64();
     let quantities = posterior.quantities();
-    let (mut compared, mut wrong) = (0, Vec::new());
+    let (mut compared, mut wrong, mut far) = (0, Vec::new(), Vec::new());
     for (_, line) in moments().iter().filter(|(n, _)| n == name) {
         let fields: Vec<&str> = line.split(',').collect();
         let [mean, sd, error] = [1, 2, 3].map(|i| fields[i].parse::<f64>().unwrap());
@@ -49,6 +51,8 @@ fn right_or_warned(name: &str) {
         );
         println!("{said}");
         compared += 1;
+        let is_near = (q.summary.mean - mean).abs() <= sd;
+        far.extend((!is_near).then(|| said.clone()));
         // A large error excuses nothing, and a quantity that did not move has none.
         if !(z.abs() <= 4.0 && ours < 0.25 * sd) {
             wrong.push(said);
@@ -58,6 +62,7 @@ fn right_or_warned(name: &str) {
     let kernels = KernelStats::total(posterior.chains.iter().flat_map(|c| &c.kernels));
     let warned = warnings(&quantities, &modes(&quantities, None), &kernels, CHAINS);
     println!("{name}: {seconds:.1} s, warnings: {warned:?}");
+    assert!(far.is_empty(), "far off:\n{}", far.join("\n"));
     assert!(wrong.is_empty() || !warned.is_empty(), "without a warning:\n{}", wrong.join("\n"));
 }
 

@@ -23,6 +23,7 @@ pub struct Case {
     pub text: String,
     pub posterior: Arc<Posterior>,
     pub records: Option<Records>,
+    pub has_data: bool,
 }
 
 /// The outcome of a check.
@@ -101,7 +102,7 @@ impl Callback for Restart {
 
 /// Checks a plan on a program, over `passes` passes.
 pub fn check(case: &Case, plan: &Plan, passes: u64, seed: u64) -> Said {
-    let (Case { text, posterior, records }, Plan { statements, kernels, .. }) = (case, plan);
+    let (Case { text, posterior, records, .. }, Plan { statements, kernels, .. }) = (case, plan);
     let collected = records.as_ref().map_or("1".to_owned(), Records::collected);
     let plan = format!(
         "{text}
@@ -251,9 +252,11 @@ impl Callback for Visits {
 }
 
 /// Returns the total variation distance between the posterior and the states of four
-/// chains of a plan, by kind.
-pub fn distance(text: &str, plan: &str, posterior: &Arc<Posterior>, seed: u64) -> f64 {
-    let longer = plan.replace("repeat 1000 {", "repeat 3000 { collect 1;");
+/// chains of a plan, by kind, or between the records' distribution and their records if that is
+/// larger.
+pub fn distance(case: &Case, plan: &str, seed: u64) -> f64 {
+    let Case { text, posterior, records, .. } = case;
+    let longer = plan.replace("repeat 1000 {", "repeat 3000 {");
     let model = Program::parse(&format!("{text}\n{longer}")).and_then(Program::compile);
     let model = model.unwrap_or_else(|e| panic!("{e}"));
     let probabilities = posterior.probabilities();
@@ -261,8 +264,11 @@ pub fn distance(text: &str, plan: &str, posterior: &Arc<Posterior>, seed: u64) -
     let visits = Arc::new(Visits { posterior: Arc::clone(posterior), counts });
     let watched: Arc<dyn Callback> = visits.clone();
     let options = RunOptions { seed, callback: Some(watched), ..RunOptions::default() };
-    model.run(&options, 4, 2).unwrap_or_else(|e| panic!("{e}"));
+    let run = model.run(&options, 4, 2).unwrap_or_else(|e| panic!("{e}"));
+    let recorded = records.as_ref().map_or(Ok(0.0), |r| r.distance(&run.draws));
     let counts = visits.counts.lock().map(|c| c.clone()).unwrap_or_default();
     let total: f64 = counts.iter().sum();
-    0.5 * counts.iter().zip(&probabilities).map(|(c, p)| (c / total - p).abs()).sum::<f64>()
+    let of_states =
+        0.5 * counts.iter().zip(&probabilities).map(|(c, p)| (c / total - p).abs()).sum::<f64>();
+    of_states.max(recorded.unwrap_or_else(|e| panic!("{e}\n{text}")))
 }

@@ -66,7 +66,8 @@ impl Made {
             Made::Wide => Records::of(&program, integration),
         };
         let text = program.to_string();
-        Some((program, Case { text, posterior, records }))
+        let has_data = program.has_effects();
+        Some((program, Case { text, posterior, records, has_data }))
     }
 }
 
@@ -117,7 +118,7 @@ impl Tally {
             _ => "mh(one(@**));".to_owned(),
         };
         self.programs += 1;
-        if let Some(records) = case.records.as_ref().filter(|_| !program.has_effects()) {
+        if let Some(records) = case.records.as_ref().filter(|_| !case.has_data) {
             self.without_data(seed, &model, records);
         }
         let mut rng = StreamKey::new(seed, 0, Purpose::MIX).stream(0, 0, 0);
@@ -161,7 +162,9 @@ impl Tally {
             Said::Failed(e) => self.wrong.push(wrong(&e)),
             Said::Counted(counts, pooled, records, moved) => {
                 let has_moved = moved > 0.0 || case.posterior.likeliest() > 0.999;
-                for (class, pooled) in [(&*plan.class, pooled), ("records", records)] {
+                let recorded = if case.has_data { "records" } else { "records, no data" };
+                let recorded = case.records.as_ref().map(|_| (recorded, records));
+                for (class, pooled) in [(&*plan.class, pooled)].into_iter().chain(recorded) {
                     let e = self.classes.entry(class.to_owned()).or_default();
                     e.0.merge(&pooled);
                     (e.1, e.2) = (e.1 + 1, e.2 + u64::from(has_moved));
@@ -200,6 +203,9 @@ impl Tally {
             );
         }
         self.refused.iter().for_each(|(why, n)| println!("refused {n}: {why}"));
+        for w in &self.wrong {
+            println!("wrong: {}", w.lines().take(2).collect::<Vec<_>>().join(" "));
+        }
     }
 }
 
@@ -296,9 +302,9 @@ fn updates_agree(seed: u64, made: Made) -> u64 {
 
 #[test]
 fn short_cuts_of_updates_agree_with_running_everything_again() {
-    for made in [Made::Narrow, Made::Wide] {
-        let compared: u64 = (0..300).map(|seed| updates_agree(seed, made)).sum();
-        assert!(compared > 10_000, "{compared}");
+    for (made, programs) in [(Made::Narrow, 300), (Made::Wide, 150)] {
+        let compared: u64 = (0..programs).map(|seed| updates_agree(seed, made)).sum();
+        assert!(compared > 30 * programs, "{compared}");
     }
 }
 
@@ -422,14 +428,15 @@ fn default_plans_reach_the_posterior() {
     let (mut programs, mut far) = (0, Vec::new());
     let seeds = first..first + number("ENUMERATED", 60).min(300);
     for (seed, made) in seeds.flat_map(|s| [(s, Made::Narrow), (s, Made::Wide)]) {
-        let Some((_, Case { text, posterior, .. })) = made.case(seed) else { continue };
-        let model = Model::from_text(&text).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
+        let Some((_, case)) = made.case(seed) else { continue };
+        let text = &case.text;
+        let model = Model::from_text(text).unwrap_or_else(|e| panic!("seed {seed}: {e}"));
         programs += 1;
         let Ok((_, Some(plan))) = model.plan() else {
             far.push(format!("seed {seed}: no plan\n{text}"));
             continue;
         };
-        let distance = check::distance(&text, &plan, &posterior, seed);
+        let distance = check::distance(&case, &plan, seed);
         if distance > 0.1 {
             far.push(format!("seed {seed}: total variation {distance:.2}\n{plan}{text}"));
         }

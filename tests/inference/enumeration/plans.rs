@@ -115,8 +115,6 @@ pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream
         all.push(own);
     }
     if rng.uniform() < 0.5 {
-        all.push(Plan::of("default plan", default));
-    } else {
         let pool: Vec<String> =
             all.iter().map(|p| p.statements.trim_end_matches(';').to_owned()).collect();
         let kernels: String = all.iter().map(|p| &*p.kernels).collect();
@@ -126,6 +124,7 @@ pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream
         let arms: String = (0..2 + rng.index(3)).map(|_| arm(rng) + " ").collect();
         all.push(Plan { kernels, ..Plan::of("mix", format!("repeat 2 {{ mix {{ {arms}}} }}")) });
     }
+    all.push(Plan::of("default plan", default));
     all
 }
 

@@ -9,6 +9,7 @@ use super::program::Program;
 use super::verdict::{Counts, Pooled};
 use pcadlang_inference::draws::Shape;
 use pcadlang_report::ChainDraws;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The number of intervals in which positions of continuous choices are counted.
 const BINS: usize = 8;
@@ -42,18 +43,7 @@ impl Records {
     /// Counts records: combinations of the discrete values, and the positions of each continuous
     /// one, which are uniform. An error if a quantity is missing.
     pub fn count(&self, draws: &ChainDraws, skip: usize) -> Result<(Counts, Pooled), String> {
-        let names: Vec<String> = draws
-            .columns
-            .iter()
-            .flat_map(|c| match c.shape {
-                Shape::Scalar => vec![c.name.clone()],
-                Shape::Vector(n) => (0..n).map(|i| format!("{}[{i}]", c.name)).collect(),
-            })
-            .collect();
-        let column = |a: &String| {
-            let at = names.iter().position(|n| *n == a[1..]);
-            at.ok_or_else(|| format!("{a} is not recorded"))
-        };
+        let column = |a: &String| column(draws, a);
         let rows = || draws.rows.iter().skip(skip);
         let n = rows().count() as u64;
         let (mut counts, mut pooled) = (Counts { draws: n, cells: Vec::new() }, Pooled::default());
@@ -83,4 +73,32 @@ impl Records {
         }
         Ok((counts, pooled))
     }
+
+    /// Returns the largest total variation distance of a discrete choice's records, over all of
+    /// them.
+    pub fn distance(&self, chains: &[ChainDraws]) -> Result<f64, String> {
+        let mut worst = 0.0f64;
+        for a in &self.discrete {
+            let i = column(&chains[0], a)?;
+            let (mut counts, rows) = (BTreeMap::new(), || chains.iter().flat_map(|c| &c.rows));
+            rows().for_each(|r| {
+                *counts.entry(vec![format!("{}", r.values[i])]).or_insert(0.0) += 1.0
+            });
+            let (n, expected) = (rows().count() as f64, self.all.joint(std::slice::from_ref(a)));
+            let keys: BTreeSet<_> = counts.keys().chain(expected.keys()).collect();
+            let off = |k| counts.get(k).unwrap_or(&0.0) / n - expected.get(k).unwrap_or(&0.0);
+            worst = worst.max(0.5 * keys.into_iter().map(|k| off(k).abs()).sum::<f64>());
+        }
+        Ok(worst)
+    }
+}
+
+/// Returns the index of a choice's records among the values of a row.
+fn column(draws: &ChainDraws, address: &str) -> Result<usize, String> {
+    let names = draws.columns.iter().flat_map(|c| match c.shape {
+        Shape::Scalar => vec![c.name.clone()],
+        Shape::Vector(n) => (0..n).map(|i| format!("{}[{i}]", c.name)).collect(),
+    });
+    let at = names.into_iter().position(|n| n == address[1..]);
+    at.ok_or_else(|| format!("{address} is not recorded"))
 }
