@@ -8,3 +8,4 @@ mod diagnostics;
 mod dist_reference;
 mod distributions;
 mod extremes;
+mod truncation;

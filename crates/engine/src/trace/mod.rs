@@ -294,7 +294,8 @@ impl Trace {
     /// proposal). Discrete choices have no coordinates.
     ///
     /// # Errors
-    /// If an operation between a choice and a score has no known derivative.
+    /// If an operation between a choice and a score has no known derivative; a recoverable
+    /// one if a density is not finite in this state.
     pub fn gradient(&self, targets: &[Target], power: f64, out: &mut Vec<f64>) -> TraceResult<()> {
         self.weighted_gradient(targets, power, &|_| 1.0, out)
     }
@@ -316,7 +317,10 @@ impl Trace {
         scored.dedup();
         let mut observed: Vec<u32> = self.scored_nodes().collect();
         self.graph.sort_by_place(&mut observed);
-        scored.extend(observed);
+        // Where the data count nothing, a state that they exclude has a gradient.
+        if power != 0.0 {
+            scored.extend(observed);
+        }
         scored.retain(|n| weight(*n) != 0.0);
         self.graph.gradient(&self.code, targets, &scored, (power, weight), out)
     }

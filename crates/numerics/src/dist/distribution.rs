@@ -37,7 +37,9 @@ pub trait Distribution: fmt::Debug + Send + Sync {
     /// kind, +inf at poles, and never NaN.
     fn log_density(&self, x: &Datum) -> f64;
 
-    /// Returns the derivatives of the log density; `None` where it is not finite.
+    /// Returns the derivatives of the log density: `None` where it is not finite, and if
+    /// the distribution has none; numbers that are not finite where they are too large
+    /// for doubles.
     fn gradient(&self, x: &Datum) -> Option<Gradient>;
 
     /// Returns whether values are a linear function of white noise, see
