@@ -23,7 +23,9 @@ impl Table {
         let shown = |builtin: Builtin| Builtin { example: examples::of(&builtin.name), ..builtin };
         let own = rows(functions.into()).chain(distributions::all()).chain(rows(rest.into()));
         let plans = rows(vec![plans::TABLE]);
-        Table::empty().with(own.map(shown).chain(kernels).chain(plans.map(shown)))
+        Table::empty()
+            .with(own.map(shown).chain(kernels).chain(plans.map(shown)))
+            .with_forms(distributions::forms())
     }
 }
 

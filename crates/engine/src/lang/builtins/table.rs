@@ -37,6 +37,11 @@ const CONSTANTS: &[Constant] = &[
 #[derive(Clone, Debug, Hash, PartialEq, Eq)]
 struct FullName(Text, Text);
 
+/// The name of a form, which no program can write.
+fn form_name(name: &str, argument: &str) -> String {
+    format!("{name} {argument}")
+}
+
 /// A borrowed [`FullName`], for look-ups.
 #[derive(Hash)]
 struct Sought<'a>(&'a str, &'a str);
@@ -83,6 +88,24 @@ impl Table {
         self
     }
 
+    /// The table with the forms of built-ins that calls may have, one by the name of an
+    /// argument that only it has. They are found by [`form`](Table::form) alone.
+    #[must_use]
+    pub(super) fn with_forms(mut self, forms: impl IntoIterator<Item = Builtin>) -> Self {
+        for b in forms {
+            let last = b.args.last().map_or("", |a| &*a.name);
+            let name = form_name(&b.name, last).into();
+            self.entries.insert(FullName(b.module.clone(), name), b);
+        }
+        self
+    }
+
+    /// Returns the index of the form of a built-in that a call has if it gives this
+    /// argument; `None` if there is one form only.
+    pub(crate) fn form(&self, b: &Builtin, argument: &str) -> Option<u32> {
+        self.find(&b.module, &form_name(&b.name, argument))
+    }
+
     /// Returns the built-in at an index from [`find`](Table::find).
     pub fn get(&self, i: u32) -> &Builtin {
         &self.entries[i as usize]
@@ -96,7 +119,8 @@ impl Table {
 
     /// All of them, in the order of the reference.
     pub fn iter(&self) -> impl Iterator<Item = &Builtin> + Clone {
-        self.entries.values()
+        let named = |(name, _): &(&FullName, &Builtin)| !name.1.contains(' ');
+        self.entries.iter().filter(named).map(|(_, b)| b)
     }
 
     /// Returns the named constants: `pi`, `inf`.

@@ -339,11 +339,9 @@ impl Distribution for Truncated {
 
     fn by_bounds(&self, lo: f64, hi: f64) -> Option<Vec<f64>> {
         let (own_lo, own_hi) = self.own_bounds();
-        if self.base.has_moving_support() && !(own_lo && own_hi) {
-            return None;
-        }
-        let mut by = vec![0.0; self.base.param_count()];
-        by.extend([if own_lo { lo } else { 0.0 }, if own_hi { hi } else { 0.0 }]);
+        let (of_lo, of_hi) = (if own_lo { lo } else { 0.0 }, if own_hi { hi } else { 0.0 });
+        let mut by = self.base.by_ends(lo - of_lo, hi - of_hi)?;
+        by.extend([of_lo, of_hi]);
         Some(by)
     }
 

@@ -39,6 +39,7 @@ fn try_make(family: &str, p: &[f64]) -> Result<Dist, ParamError> {
         "multinomial" => Multinomial::new(p[0], &p[1..])?.into(),
         "lkj" => Lkj::new(p[0], p[1])?.into(),
         "categorical" => Categorical::new(p)?.into(),
+        "categorical_logits" => CategoricalLogits::new(p)?.into(),
         "dirichlet" => Dirichlet::new(p)?.into(),
         _ => {
             let family = FAMILIES.iter().find(|f| f.name == family).unwrap();

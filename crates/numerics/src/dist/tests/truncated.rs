@@ -29,6 +29,9 @@ const DISCRETE: &[(&str, &[f64])] = &[
     ("geometric", &[0.3]),
     ("uniform_discrete", &[-2.0, 9.0]),
     ("categorical", &[0.3, 0.2, 0.1, 0.9, 0.4]),
+    ("poisson_log", &[1.2]),
+    ("binomial_logit", &[12.0, -0.6]),
+    ("categorical_logits", &[-0.3, 0.2, 1.1, -0.9, 0.4]),
 ];
 
 fn cut(family: &str, p: &[f64], lo: f64, hi: f64) -> Dist {
@@ -158,7 +161,7 @@ fn slopes_are_those_of_differences() {
             let x = if discrete { 2.0 } else { 0.5 * (lo.max(0.0) + hi.min(1.0)) };
             let d = cut(family, p, *lo, *hi);
             let g = d.gradient(&Datum::Num(x)).unwrap_or_else(|| panic!("{family} {lo} {hi}"));
-            let whole = !matches!(*family, "binomial" | "uniform_discrete");
+            let whole = !matches!(*family, "binomial" | "binomial_logit" | "uniform_discrete");
             for i in 0..p.len() {
                 if !whole && (i == 0 || *family == "uniform_discrete") {
                     continue;
