@@ -3,9 +3,9 @@
 
 #[path = "../common/mod.rs"]
 mod common;
-
 mod diagnostics;
 mod dist_reference;
 mod distributions;
 mod extremes;
+mod poles;
 mod truncation;

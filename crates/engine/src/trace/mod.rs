@@ -6,6 +6,7 @@
 //! draws it from its prior given the rest.
 
 mod choices;
+mod coarse;
 mod eval;
 mod explain;
 mod gradient;
@@ -40,6 +41,7 @@ pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
 use crate::lang::code::Code;
 pub use crate::lang::error::RunError;
 use crate::lang::value::Value;
+use coarse::Coarse;
 #[doc(hidden)]
 pub use gradient::Recording;
 use graph::Graph;
@@ -55,6 +57,7 @@ pub struct Trace {
     code: Arc<Code>,
     graph: Graph,
     update: Option<Before>,
+    coarse: Coarse,
     /// Identifies the trace that selections belong to; a clone gets its own.
     identity: Arc<()>,
 }
@@ -62,7 +65,8 @@ pub struct Trace {
 impl Clone for Trace {
     fn clone(&self) -> Self {
         let (code, graph) = (Arc::clone(&self.code), self.graph.clone());
-        Trace { code, graph, update: self.update.clone(), identity: Arc::new(()) }
+        let (update, coarse) = (self.update.clone(), self.coarse.clone());
+        Trace { code, graph, update, coarse, identity: Arc::new(()) }
     }
 }
 
@@ -74,7 +78,7 @@ impl Trace {
     /// observations are ignored.
     pub fn prior(code: Arc<Code>, limits: Limits) -> Self {
         let graph = Graph::new(&code, limits);
-        Trace { code, graph, update: None, identity: Arc::new(()) }
+        Trace { code, graph, update: None, coarse: Coarse::default(), identity: Arc::new(()) }
     }
 
     /// Runs a program and draws the choices that its observations depend on.
@@ -240,6 +244,7 @@ impl Trace {
     /// Commits the pending proposal, if there is one.
     pub fn commit(&mut self) {
         if self.update.take().is_some() {
+            self.keep_pending();
             self.graph.commit(&self.code);
         }
     }

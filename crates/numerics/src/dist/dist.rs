@@ -39,6 +39,7 @@ impl Dist {
         from_noncentred_vjp(by: &[f64]) -> Option<Vec<f64>>;
         to_noncentred(value: &Datum) -> Option<Datum>;
         stored_support() -> Support;
+        pole() -> Option<f64>;
         mean() -> Option<f64>;
         sd() -> Option<f64>;
         cdf_slopes(x: f64) -> Option<CdfSlopes>;

@@ -121,7 +121,19 @@ pub trait Distribution: fmt::Debug + Send + Sync {
     /// Returns the space of stored forms.
     #[doc(hidden)]
     fn stored_support(&self) -> Support {
-        self.support()
+        match (self.pole(), self.support()) {
+            (Some(power), Support::Interval { lo, hi }) if hi != 0.0 => {
+                Support::Pole { lo, hi, power }
+            }
+            (_, support) => support,
+        }
+    }
+
+    /// Returns the power of the distance that the probability near the upper bound is
+    /// proportional to, if the density has a pole there.
+    #[doc(hidden)]
+    fn pole(&self) -> Option<f64> {
+        None
     }
 
     /// Returns the mean of a number, if it exists. Truth values count as 0 and 1.

@@ -78,6 +78,11 @@ impl Scalar for Beta {
         Some(smallvec![by_a, speed_by_differences(self.b, own, |b| tails(self.a, b))])
     }
 
+    #[inline]
+    fn upper_pole(&self) -> Option<f64> {
+        (self.b < 1.0).then_some(self.b)
+    }
+
     fn number_mean(&self) -> Option<f64> {
         Some(1.0 / (1.0 + self.b / self.a))
     }

@@ -333,6 +333,11 @@ impl Distribution for Truncated {
         self.base.param_count() + 2
     }
 
+    fn pole(&self) -> Option<f64> {
+        let hi = |s: &Support| ends(s).map(|(_, hi)| hi);
+        self.base.pole().filter(|_| hi(&self.support) == hi(&self.base.support()))
+    }
+
     fn has_moving_support(&self) -> bool {
         true
     }

@@ -3,9 +3,7 @@
 //! "The generation of binomial random variates", BTRS).
 
 use crate::dist::*;
-use crate::num::{
-    LN_SQRT_2PI, beta_tails, deviance, expit, ln_choose, log1p_exp, stirling_error,
-};
+use crate::num::{LN_SQRT_2PI, beta_tails, deviance, expit, ln_choose, log1p_exp, stirling_error};
 
 /// `binomial(n, p)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,11 +84,7 @@ impl Scalar for Binomial {
     }
 
     fn draw(&self, rng: &mut Stream) -> f64 {
-        if self.p <= 0.5 {
-            self.draw_few(self.p, rng)
-        } else {
-            self.n - self.draw_few(self.q, rng)
-        }
+        if self.p <= 0.5 { self.draw_few(self.p, rng) } else { self.n - self.draw_few(self.q, rng) }
     }
 
     fn log_density_num(&self, k: f64) -> f64 {

@@ -226,6 +226,11 @@ impl Distribution for Mixture {
         Some(by_weight)
     }
 
+    /// That of the components which the others vanish beside.
+    fn pole(&self) -> Option<f64> {
+        self.components.iter().filter_map(Dist::pole).min_by(f64::total_cmp)
+    }
+
     fn has_moving_support(&self) -> bool {
         self.components.iter().any(Dist::has_moving_support)
     }

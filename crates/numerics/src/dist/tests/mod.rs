@@ -8,6 +8,7 @@ mod gradients;
 mod matrices;
 mod mixtures;
 mod normalisation;
+mod poles;
 mod samplers;
 mod transforms;
 mod truncated;

@@ -350,8 +350,15 @@ fn unlike_priors_in_order() {
 /// Calls `check` with every family truncated in all these ways, with all parameters from a
 /// list, and the logarithm of the interval's probability.
 fn each_cut(values: &[f64], check: impl Fn(&str, &[f64], (f64, f64), &Dist)) {
-    let bounds =
-        [(5.0, INF), (0.95, INF), (0.95, 0.99), (5.0, 6.0), (-INF, 0.5), (-3.0, -2.0), (-INF, -5.0)];
+    let bounds = [
+        (5.0, INF),
+        (0.95, INF),
+        (0.95, 0.99),
+        (5.0, 6.0),
+        (-INF, 0.5),
+        (-3.0, -2.0),
+        (-INF, -5.0),
+    ];
     let mut families: Vec<(&str, usize)> = CONTINUOUS.iter().map(|(f, p)| (*f, p.len())).collect();
     families.dedup();
     for (family, n) in families {
