@@ -3,9 +3,11 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+
 mod diagnostics;
 mod dist_reference;
 mod distributions;
 mod extremes;
+mod logits;
 mod poles;
 mod truncation;

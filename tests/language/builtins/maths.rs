@@ -38,7 +38,7 @@ fn functions_have_their_known_values() {
     }
     near(call("log_normal_cdf", &[num(-40.0)]), -804.608_442_013_753_8);
     near(call("log1m_exp", &[num(-1e-20)]), -46.051_701_859_880_914);
-    same(call("log1m_exp", &[arr(&[0.0, f64::NEG_INFINITY])]), arr(&[f64::NEG_INFINITY, 0.0]));
+    same(call("log1m_exp", &[num(0.0)]), num(f64::NEG_INFINITY));
     same(call("abs", &[arr(&[-1.5, 2.0])]), arr(&[1.5, 2.0]));
     same(call("sign", &[arr(&[-1.5, 2.0, 0.0])]), arr(&[-1.0, 1.0, 0.0]));
     same(call("step", &[arr(&[-1e-300, 0.0, 2.0])]), arr(&[0.0, 1.0, 1.0]));

@@ -30,6 +30,8 @@ mod update;
 pub use crate::lang::address::{Address, AddressSegment, AddressTextError};
 pub use choices::{Selection, Target};
 #[doc(hidden)]
+pub use coarse::CoarseState;
+#[doc(hidden)]
 pub use explain::{Dependent, Dependents, Effect, Term};
 pub use limits::{Limits, Stop};
 pub use observed::{Observation, Replicate};

@@ -28,6 +28,9 @@ fn beyond(lo: f64, hi: f64, y: f64) -> Option<f64> {
     (above < LN_1_5).then_some(above)
 }
 
+/// The largest coordinate.
+const FARTHEST: f64 = 1e300;
+
 /// ln 1.5: half way from the last double to the one before.
 const LN_1_5: f64 = 0.405_465_108_108_164_4;
 
@@ -43,6 +46,7 @@ pub(super) fn to_free(lo: f64, hi: f64, power: f64, x: f64, beyond: f64) -> f64 
 /// Returns the number at a coordinate, and the log Jacobian, with which a density that is
 /// proportional to distance^(power - 1) has the right probability beyond the last double.
 pub(super) fn from_free(lo: f64, hi: f64, power: f64, y: f64) -> (f64, f64) {
+    let y = y.min(FARTHEST);
     match beyond(lo, hi, y) {
         None => Support::Interval { lo, hi }.from_free_scalar(y),
         Some(above) => (hi.next_down(), libm::log(hi - lo) - log1p_exp(y) + (power - 1.0) * above),
@@ -83,7 +87,7 @@ impl Support {
     ) -> Option<f64> {
         let Support::Pole { lo, hi, power } = self else { return None };
         match kept {
-            Some(y) if self.from_free_scalar(y).0 == x => Some(y),
+            Some(y) if y.is_finite() && self.from_free_scalar(y).0 == x => Some(y),
             _ if x >= hi.next_down() => Some(to_free(*lo, *hi, *power, x, uniform())),
             _ => None,
         }

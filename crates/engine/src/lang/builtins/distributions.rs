@@ -55,17 +55,16 @@ fn by_form(a: &Args) -> Result<Dist, Fault> {
     let Some((family, other)) = family.and_then(|f| Some((f, other_form(f)?))) else {
         return Err(Fault::type_error(format!("{name} has one form")));
     };
-    let last = a.values.len().saturating_sub(2);
-    let (shared, given) = a.values.split_at(last);
+    let last = a.builtin.args.len().saturating_sub(2);
     let (form, by) = match (a.given(last), a.given(last + 1)) {
-        (true, false) => (family, &given[..1]),
-        (false, true) => (other, &given[1..]),
+        (true, false) => (family, last),
+        (false, true) => (other, last + 1),
         _ => {
-            let [p, q] = [&a.builtin.args[last].name, &a.builtin.args[last + 1].name];
+            let [p, q] = [last, last + 1].map(|i| a.builtin.args.get(i).map_or("", |p| &*p.name));
             return Err(Fault::type_error(format!("{name}: give either `{p}` or `{q}`")));
         }
     };
-    let values: SmallVec<[&Value; 4]> = shared.iter().chain(by).copied().collect();
+    let values: SmallVec<[&Value; 4]> = (0..last).chain([by]).map(|i| a.get(i)).collect();
     reader(form.name)(&Args { builtin: &builtin(form), values: &values })
 }
 

@@ -37,6 +37,12 @@ const CONSTANTS: &[Constant] = &[
 #[derive(Clone, Debug, Hash, PartialEq, Eq)]
 struct FullName(Text, Text);
 
+impl FullName {
+    fn is_form(&self) -> bool {
+        self.1.contains(' ')
+    }
+}
+
 /// The name of a form, which no program can write.
 fn form_name(name: &str, argument: &str) -> String {
     format!("{name} {argument}")
@@ -84,8 +90,12 @@ impl Table {
     #[must_use]
     pub fn with(mut self, more: impl IntoIterator<Item = Builtin>) -> Self {
         let more = more.into_iter();
+        // Forms stay behind what is listed.
+        let forms: Vec<Builtin> =
+            self.entries.iter().filter(|(n, _)| n.is_form()).map(|(_, b)| b.clone()).collect();
+        self.entries.retain(|n, _| !n.is_form());
         self.entries.extend(more.map(|b| (FullName(b.module.clone(), b.name.clone()), b)));
-        self
+        self.with_forms(forms)
     }
 
     /// The table with the forms of built-ins that calls may have, one by the name of an
@@ -119,8 +129,7 @@ impl Table {
 
     /// All of them, in the order of the reference.
     pub fn iter(&self) -> impl Iterator<Item = &Builtin> + Clone {
-        let named = |(name, _): &(&FullName, &Builtin)| !name.1.contains(' ');
-        self.entries.iter().filter(named).map(|(_, b)| b)
+        self.entries.iter().filter(|(name, _)| !name.is_form()).map(|(_, b)| b)
     }
 
     /// Returns the named constants: `pi`, `inf`.
