@@ -8,3 +8,6 @@ mod diagnostics;
 mod dist_reference;
 mod distributions;
 mod extremes;
+mod logits;
+mod poles;
+mod truncation;

@@ -22,7 +22,8 @@ pub use log_tails::{beta_tails, gamma_tails};
 pub use saddle::{LN_SQRT_2PI, deviance, stirling_error};
 pub use special::{
     digamma, expit, inv_normal_cdf, ln_beta, ln_choose, ln_factorial, ln_gamma, log_diff_exp,
-    log_normal_cdf, log_sum_exp, log1p_exp, logit, normal_cdf,
+    log_normal_cdf, log_normal_cdf_slope, log_sum_exp, log1m_exp, log1p_exp, logit, normal_cdf,
+    normal_density,
 };
 pub use tails::{log_scaled_i0, mills_ratio, one_minus_i1_over_i0};
 

@@ -242,12 +242,36 @@ fn body() -> Value {
 fn cases() -> Vec<E> {
     let mut all = Vec::new();
     for name in [
-        "exp", "expm1", "log", "log1p", "sqrt", "abs", "sin", "cos", "tan", "asin", "acos", "atan",
-        "sinh", "cosh", "tanh", "deg", "logit", "expit", "erf", "lgamma", "neg",
+        "exp",
+        "expm1",
+        "log",
+        "log1p",
+        "sqrt",
+        "abs",
+        "sin",
+        "cos",
+        "tan",
+        "asin",
+        "acos",
+        "atan",
+        "sinh",
+        "cosh",
+        "tanh",
+        "deg",
+        "logit",
+        "expit",
+        "erf",
+        "erfc",
+        "normal_cdf",
+        "log_normal_cdf",
+        "lgamma",
+        "neg",
     ] {
         all.push(Call(name, vec![by(0.4)]));
         all.push(Call(name, vec![By(list(&[arr(&[0.3, 0.7]), num(0.2)]))]));
     }
+    all.push(Call("log1m_exp", vec![by(-0.4)]));
+    all.push(Call("log1m_exp", vec![Call("neg", vec![vector(&[0.1, 0.9, 30.0])])]));
     for name in ["+", "-", "*", "/", "%", "**", "pow", "atan2", "min", "max"] {
         all.push(Call(name, vec![by(1.3), by(0.7)]));
         all.push(Call(name, vec![vector(&[1.3, 0.4, 2.2]), vector(&[0.7, 0.6, 0.9])]));

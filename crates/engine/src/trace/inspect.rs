@@ -113,6 +113,9 @@ impl Trace {
         }
         let mut y = Vec::with_capacity(support.free_dim());
         support.to_free(&stored, &mut y);
+        if let (Support::Pole { .. }, Datum::Num(x), [y]) = (&support, &stored, &mut y[..]) {
+            *y = self.coarse_coordinate(t, &support, *x).unwrap_or(*y);
+        }
         let jacobian = support.from_free(&y).1;
         Some((y, jacobian))
     }

@@ -6,6 +6,7 @@
 //! draws it from its prior given the rest.
 
 mod choices;
+mod coarse;
 mod eval;
 mod explain;
 mod gradient;
@@ -29,6 +30,8 @@ mod update;
 pub use crate::lang::address::{Address, AddressSegment, AddressTextError};
 pub use choices::{Selection, Target};
 #[doc(hidden)]
+pub use coarse::CoarseState;
+#[doc(hidden)]
 pub use explain::{Dependent, Dependents, Effect, Term};
 pub use limits::{Limits, Stop};
 pub use observed::{Observation, Replicate};
@@ -40,6 +43,7 @@ pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
 use crate::lang::code::Code;
 pub use crate::lang::error::RunError;
 use crate::lang::value::Value;
+use coarse::Coarse;
 #[doc(hidden)]
 pub use gradient::Recording;
 use graph::Graph;
@@ -55,6 +59,7 @@ pub struct Trace {
     code: Arc<Code>,
     graph: Graph,
     update: Option<Before>,
+    coarse: Coarse,
     /// Identifies the trace that selections belong to; a clone gets its own.
     identity: Arc<()>,
 }
@@ -62,7 +67,8 @@ pub struct Trace {
 impl Clone for Trace {
     fn clone(&self) -> Self {
         let (code, graph) = (Arc::clone(&self.code), self.graph.clone());
-        Trace { code, graph, update: self.update.clone(), identity: Arc::new(()) }
+        let (update, coarse) = (self.update.clone(), self.coarse.clone());
+        Trace { code, graph, update, coarse, identity: Arc::new(()) }
     }
 }
 
@@ -74,7 +80,7 @@ impl Trace {
     /// observations are ignored.
     pub fn prior(code: Arc<Code>, limits: Limits) -> Self {
         let graph = Graph::new(&code, limits);
-        Trace { code, graph, update: None, identity: Arc::new(()) }
+        Trace { code, graph, update: None, coarse: Coarse::default(), identity: Arc::new(()) }
     }
 
     /// Runs a program and draws the choices that its observations depend on.
@@ -257,6 +263,7 @@ impl Trace {
     /// Commits the pending proposal, if there is one.
     pub fn commit(&mut self) {
         if self.update.take().is_some() {
+            self.keep_pending();
             self.graph.commit(&self.code);
         }
     }
@@ -311,7 +318,8 @@ impl Trace {
     /// proposal). Discrete choices have no coordinates.
     ///
     /// # Errors
-    /// If an operation between a choice and a score has no known derivative.
+    /// If an operation between a choice and a score has no known derivative; a recoverable
+    /// one if a density is not finite in this state.
     pub fn gradient(&self, targets: &[Target], power: f64, out: &mut Vec<f64>) -> TraceResult<()> {
         self.weighted_gradient(targets, power, &|_| 1.0, out)
     }
@@ -333,7 +341,10 @@ impl Trace {
         scored.dedup();
         let mut observed: Vec<u32> = self.scored_nodes().collect();
         self.graph.sort_by_place(&mut observed);
-        scored.extend(observed);
+        // Where the data count nothing, a state that they exclude has a gradient.
+        if power != 0.0 {
+            scored.extend(observed);
+        }
         scored.retain(|n| weight(*n) != 0.0);
         self.graph.gradient(&self.code, targets, &scored, (power, weight), out)
     }

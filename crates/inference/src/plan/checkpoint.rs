@@ -11,7 +11,7 @@ use crate::plain::Plain;
 use crate::population::Population;
 use crate::state::{StateError, holds, pack, unpack};
 use crate::stats::{KernelStats, SiteStats};
-use pcadlang_engine::trace::{Constraint, Selector};
+use pcadlang_engine::trace::{CoarseState, Constraint, Selector};
 use serde::{Deserialize, Serialize};
 
 type State = Vec<(u64, Constraint)>;
@@ -36,6 +36,9 @@ pub struct Checkpoint {
     pub(super) power: f64,
     /// The choices.
     pub(super) state: State,
+    /// The coordinates of choices that their values do not tell.
+    #[serde(default)]
+    pub(super) coarse: CoarseState,
     pub(super) best: Option<(f64, State)>,
     pub(super) population: Population,
     pub(super) variables: Vec<Plain>,

@@ -46,6 +46,7 @@ impl<'a> Runner<'a> {
             finished: self.finished,
             power: self.power,
             state: self.trace.constraints(),
+            coarse: self.trace.coarse_state(),
             best: self.best.clone(),
             population: self.population.clone(),
             variables,
@@ -87,8 +88,9 @@ impl<'a> Runner<'a> {
             return Err(StateError::new(message).into());
         }
         let count = c.state.len();
-        let (trace, _) =
+        let (mut trace, _) =
             Trace::generate(Arc::clone(code), c.state, Draws::default(), options.limits.clone())?;
+        trace.restore_coarse(&c.coarse);
         if trace.choice_count() != count {
             return Err(
                 StateError::new("the checkpoint's choices are not those of the program").into()

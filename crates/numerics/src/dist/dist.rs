@@ -39,6 +39,7 @@ impl Dist {
         from_noncentred_vjp(by: &[f64]) -> Option<Vec<f64>>;
         to_noncentred(value: &Datum) -> Option<Datum>;
         stored_support() -> Support;
+        pole() -> Option<f64>;
         mean() -> Option<f64>;
         sd() -> Option<f64>;
         cdf_slopes(x: f64) -> Option<CdfSlopes>;
@@ -55,6 +56,7 @@ impl Dist {
     pub fn log_density_bool(&self, x: bool) -> f64 {
         match self {
             Dist::Flip(d) => d.log_probability(x),
+            Dist::FlipLogit(d) => d.log_probability(x),
             _ => self.log_density(&Datum::Bool(x)),
         }
     }
@@ -85,6 +87,12 @@ impl Dist {
             Support::AtMost { .. } => (0.0, by),
             _ => (0.0, 0.0),
         };
+        self.by_ends(lo, hi)
+    }
+
+    /// Returns the derivatives with respect to the parameters of a function of the bounds
+    /// of the support, given those with respect to the bounds.
+    pub(super) fn by_ends(&self, lo: f64, hi: f64) -> Option<Vec<f64>> {
         each!(self, d => d.by_bounds(lo, hi))
     }
 

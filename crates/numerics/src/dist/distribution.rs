@@ -37,7 +37,9 @@ pub trait Distribution: fmt::Debug + Send + Sync {
     /// kind, +inf at poles, and never NaN.
     fn log_density(&self, x: &Datum) -> f64;
 
-    /// Returns the derivatives of the log density; `None` where it is not finite.
+    /// Returns the derivatives of the log density: `None` where it is not finite, and if
+    /// the distribution has none; numbers that are not finite where they are too large
+    /// for doubles.
     fn gradient(&self, x: &Datum) -> Option<Gradient>;
 
     /// Returns whether values are a linear function of white noise, see
@@ -119,7 +121,19 @@ pub trait Distribution: fmt::Debug + Send + Sync {
     /// Returns the space of stored forms.
     #[doc(hidden)]
     fn stored_support(&self) -> Support {
-        self.support()
+        match (self.pole(), self.support()) {
+            (Some(power), Support::Interval { lo, hi }) if hi != 0.0 => {
+                Support::Pole { lo, hi, power }
+            }
+            (_, support) => support,
+        }
+    }
+
+    /// Returns the power of the distance that the probability near the upper bound is
+    /// proportional to, if the density has a pole there.
+    #[doc(hidden)]
+    fn pole(&self) -> Option<f64> {
+        None
     }
 
     /// Returns the mean of a number, if it exists. Truth values count as 0 and 1.

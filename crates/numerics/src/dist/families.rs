@@ -177,6 +177,15 @@ families! { $
     density "p if x else 1 - p"
     drawn Unknown;
 
+    flip_logit: inline numbers FlipLogit {
+        logit: finite, "The log odds of true, log(p / (1 - p)).";
+    }
+    doc "A truth value, by its log odds."
+    on "false, true"
+    density "1 / (1 + exp(-logit)) if x else 1 / (1 + exp(logit))"
+    drawn Unknown
+    form of flip;
+
     uniform_discrete: inline numbers UniformDiscrete {
         lo: integer, "The minimum.";
         hi: integer, "The maximum, included.";
@@ -193,6 +202,15 @@ families! { $
     on "0, 1, …, n"
     density "n! / (x! (n - x)!) p^x (1 - p)^(n - x)";
 
+    binomial_logit: inline numbers BinomialLogit {
+        n: integer, "The number of trials, an integer.";
+        logit: finite, "The log odds of success, log(p / (1 - p)).";
+    }
+    doc "The number of successes in independent trials, by their log odds."
+    on "0, 1, …, n"
+    density "n! / (x! (n - x)!) exp(logit x) / (1 + exp(logit))^n"
+    form of binomial;
+
     poisson: inline numbers Poisson {
         rate: rate, "The mean, not negative.";
     }
@@ -200,12 +218,28 @@ families! { $
     on "0, 1, 2, …"
     density "rate^x exp(-rate) / x!";
 
+    poisson_log: inline numbers PoissonLog {
+        log: finite, "The logarithm of the mean, at most that of 2^53.";
+    }
+    doc "The number of events at a constant rate, by the logarithm of the rate."
+    on "0, 1, 2, …"
+    density "exp(log x - exp(log)) / x!"
+    form of poisson;
+
     categorical: inline other Categorical {
         weights: Array, "One weight for each of 0, 1, …; they need not sum to 1.";
     }
     doc "The categorical distribution: an index drawn in proportion to weights."
     on "0, 1, …, len(weights) - 1"
     density "weights[x] / sum(weights)";
+
+    categorical_logits: inline other CategoricalLogits {
+        logits: Array, "The logarithm of each weight; a constant added to all changes nothing.";
+    }
+    doc "An index drawn in proportion to weights, by their logarithms."
+    on "0, 1, …, len(logits) - 1"
+    density "exp(logits[x] - log_sum_exp(logits))"
+    form of categorical;
 
     dirichlet: shared other Dirichlet {
         alpha: Array, "One positive concentration per component.";

@@ -51,6 +51,9 @@ pub enum Drawn {
 pub struct Family {
     /// The name in the language.
     pub name: &'static str,
+    /// The family that this one is another parametrisation of, by its last parameter:
+    /// programs call it by that name.
+    pub form_of: Option<&'static str>,
     /// A description in one sentence.
     pub doc: &'static str,
     /// The parameters, in order.
@@ -101,7 +104,7 @@ where
 
 /// A family with a row in the table.
 pub trait Named {
-    /// The name in the language.
+    /// The name in the language, by which errors call it.
     const NAME: &'static str;
 
     /// Returns the error that a parameter violates this rule.
@@ -118,7 +121,8 @@ pub trait Named {
 /// - the parameters: for `numbers`, each with the check of `param.rs` that it passes
 ///   before `of` makes the distribution; for `other`, each with its [`ParamKind`];
 /// - what users read about it;
-/// - what is `drawn`, if not [`Drawn::Elementwise`].
+/// - what is `drawn`, if not [`Drawn::Elementwise`];
+/// - the family that it is another form `of`, see [`Family::form_of`].
 ///
 /// Inline families of numbers are also scored in batches. The macro is given a `$` for
 /// the macro `each` that it defines.
@@ -133,7 +137,8 @@ macro_rules! families {
             doc $doc:literal
             on $support:literal
             density $formula:literal
-            $(drawn $drawn:ident)?;
+            $(drawn $drawn:ident)?
+            $(form of $of:ident)?;
         )*
     ) => {
         /// A distribution of any family, at most 48 bytes: most scalar families are
@@ -163,6 +168,7 @@ macro_rules! families {
         pub const FAMILIES: &[Family] = &[
             $(Family {
                 name: stringify!($name),
+                form_of: family!(option $(stringify!($of))?),
                 doc: $doc,
                 params: &[$(ParamDoc {
                     name: stringify!($p),
@@ -189,7 +195,7 @@ macro_rules! families {
 
         $(
             impl Named for $Family {
-                const NAME: &'static str = stringify!($name);
+                const NAME: &'static str = family!(called $name $($of)?);
             }
 
             impl From<$Family> for Dist {
@@ -213,7 +219,9 @@ macro_rules! family {
     (drawn) => { Drawn::Elementwise };
     (drawn $drawn:ident) => { Drawn::$drawn };
     (option) => { None };
-    (option $default:literal) => { Some($default) };
+    (option $default:expr) => { Some($default) };
+    (called $name:ident) => { stringify!($name) };
+    (called $name:ident $of:ident) => { stringify!($of) };
     (count $($p:ident)*) => { [$(stringify!($p)),*].len() };
     (numbers numbers $Family:ident $($p:ident)*) => {
         Some(Numbers::of::<$Family, { family!(count $($p)*) }>())

@@ -18,6 +18,7 @@ mod family;
 mod joint;
 mod normals;
 mod param;
+mod pole;
 mod scalar;
 mod support;
 mod tails;

@@ -70,6 +70,12 @@ pub trait Scalar: Named + fmt::Debug + Send + Sync {
         None
     }
 
+    /// See [`Distribution::pole`].
+    #[inline]
+    fn upper_pole(&self) -> Option<f64> {
+        None
+    }
+
     /// Returns the mean, if it exists.
     fn number_mean(&self) -> Option<f64> {
         None
@@ -152,6 +158,11 @@ impl<T: Scalar> Distribution for T {
             [z] => self.unstandardised(*z).map(Datum::Num),
             _ => None,
         }
+    }
+
+    #[inline]
+    fn pole(&self) -> Option<f64> {
+        self.upper_pole()
     }
 
     fn mean(&self) -> Option<f64> {

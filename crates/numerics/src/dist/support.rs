@@ -31,6 +31,17 @@ pub enum Support {
         /// The upper bound.
         hi: f64,
     },
+    /// The same, of a density with a pole at the upper bound: the probability within a
+    /// small distance of it is proportional to a power of the distance. Coordinates go on
+    /// where doubles are too coarse to show the distance.
+    Pole {
+        /// The lower bound.
+        lo: f64,
+        /// The upper bound.
+        hi: f64,
+        /// The power, above 0 and below 1.
+        power: f64,
+    },
     /// Numbers at or below a bound.
     AtMost {
         /// The bound.
@@ -83,6 +94,7 @@ impl Support {
                 | AtLeast { .. }
                 | AtMost { .. }
                 | Interval { .. }
+                | Pole { .. }
                 | Circle
                 | Integers { .. }
         )
@@ -175,7 +187,7 @@ impl Support {
             Support::Real => x.is_finite(),
             Support::Positive => x > 0.0 && x.is_finite(),
             Support::AtLeast { lo } => x >= *lo && x.is_finite(),
-            Support::Interval { lo, hi } => (*lo..=*hi).contains(&x),
+            Support::Interval { lo, hi } | Support::Pole { lo, hi, .. } => (*lo..=*hi).contains(&x),
             Support::AtMost { hi } => x <= *hi && x.is_finite(),
             Support::Circle => x > -PI && x <= PI,
             Support::Integers { lo, hi } => {
@@ -235,7 +247,9 @@ impl fmt::Display for Support {
             Support::Real => write!(f, "all finite numbers"),
             Support::Positive => write!(f, "numbers above 0"),
             Support::AtLeast { lo } => write!(f, "numbers of at least {lo}"),
-            Support::Interval { lo, hi } => write!(f, "numbers from {lo} to {hi}"),
+            Support::Interval { lo, hi } | Support::Pole { lo, hi, .. } => {
+                write!(f, "numbers from {lo} to {hi}")
+            }
             Support::AtMost { hi } => write!(f, "numbers of at most {hi}"),
             Support::Circle => write!(f, "angles in (-pi, pi]"),
             Support::Boolean => write!(f, "true and false"),

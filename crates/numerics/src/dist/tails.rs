@@ -57,18 +57,24 @@ impl Tails {
 
 /// Returns dP(X <= x)/da divided by the density at x, by a central difference of fourth
 /// order of the logarithm of the smaller tail. `tails` takes the parameter; `log_density`
-/// is that at x.
+/// is that at x. NaN where the tails beside this parameter are not computed.
 pub(super) fn speed_by_differences(
     a: f64,
     log_density: f64,
     tails: impl Fn(f64) -> Option<Tails>,
-) -> Option<f64> {
-    let here = tails(a)?;
-    let lower = here.below < here.above;
+) -> f64 {
     let h = 2e-3 * a;
-    let at = |k: f64| tails(a + k * h).map(|t| if lower { t.below } else { t.above });
-    let slope = (8.0 * (at(1.0)? - at(-1.0)?) - (at(2.0)? - at(-2.0)?)) / (12.0 * h);
-    let (part, sign) = if lower { (here.below, 1.0) } else { (here.above, -1.0) };
-    let speed = sign * slope * libm::exp(part - log_density);
-    Some(if speed.is_finite() { speed } else { 0.0 })
+    let around = [0.0, 1.0, -1.0, 2.0, -2.0].map(|k| tails(a + k * h));
+    let [Some(here), Some(up), Some(down), Some(up2), Some(down2)] = around else {
+        return f64::NAN;
+    };
+    let lower = here.below < here.above;
+    let part = |t: Tails| if lower { t.below } else { t.above };
+    let slope = (8.0 * (part(up) - part(down)) - (part(up2) - part(down2))) / (12.0 * h);
+    let speed = slope * libm::exp(part(here) - log_density);
+    match speed.is_finite() {
+        true if lower => speed,
+        true => -speed,
+        false => 0.0,
+    }
 }

@@ -8,6 +8,7 @@
 
 use super::clamp::{FAR, near};
 use super::joint::{ascending, triangle};
+use super::pole;
 use super::support::wrap_angle;
 use super::{Datum, Support};
 use crate::num::log1p_exp;
@@ -48,6 +49,7 @@ impl Support {
             Support::AtLeast { lo } => libm::log(x - lo),
             Support::AtMost { hi } => libm::log(hi - x),
             Support::Circle => return wrap_angle(x),
+            Support::Pole { lo, hi, power } => return pole::to_free(*lo, *hi, *power, x, 0.5),
             Support::Interval { lo, hi } => libm::log(x - lo) - libm::log(hi - x),
             _ => return 0.0,
         };
@@ -79,6 +81,7 @@ impl Support {
                 ((hi - libm::exp(y)).clamp(f64::MIN, hi.next_down()), y)
             }
             Support::Circle => (wrap_angle(y), 0.0),
+            Support::Pole { lo, hi, power } => pole::from_free(*lo, *hi, *power, y),
             Support::Interval { lo, hi } => {
                 let (width, y) = (hi - lo, near(y));
                 let share = libm::exp(-log1p_exp(y.abs()));
@@ -205,6 +208,9 @@ impl Support {
             Support::Interval { lo, hi } => {
                 let p = crate::num::expit(near(at(0)));
                 out.push(by(0) * (hi - lo) * p * (1.0 - p) + 1.0 - 2.0 * p);
+            }
+            Support::Pole { lo, hi, power } => {
+                out.push(pole::gradient(*lo, *hi, *power, at(0), by(0)))
             }
             Support::Simplex(n) => stick_gradient(*n, at, by, out),
             Support::Product(one, n) => {

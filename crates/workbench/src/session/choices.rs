@@ -111,7 +111,7 @@ fn bounds(support: &Support) -> [Option<f64>; 2] {
         Support::Positive => [Some(0.0), None],
         Support::AtLeast { lo } => [Some(*lo), None],
         Support::AtMost { hi } => [None, Some(*hi)],
-        Support::Interval { lo, hi } => [Some(*lo), Some(*hi)],
+        Support::Interval { lo, hi } | Support::Pole { lo, hi, .. } => [Some(*lo), Some(*hi)],
         Support::Circle => [Some(-std::f64::consts::PI), Some(std::f64::consts::PI)],
         Support::Integers { lo, hi } => [Some(*lo as f64), hi.map(|hi| hi as f64)],
         Support::Simplex(_) => [Some(0.0), Some(1.0)],

@@ -20,9 +20,52 @@ use pcadlang_numerics::dist::{self, Dist, FAMILIES, Family, ParamDoc, ParamError
 use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
 
-/// The built-ins of all families.
+/// The built-ins of all families. One with several forms takes the arguments of all, and
+/// serves as a function value; calls are those of a form.
 pub(super) fn all() -> impl Iterator<Item = Builtin> {
-    FAMILIES.iter().map(builtin)
+    FAMILIES.iter().filter(|f| f.form_of.is_none()).map(|f| match other_form(f) {
+        Some(other) => with_both(f, other),
+        None => builtin(f),
+    })
+}
+
+/// The forms of families that have two.
+pub(super) fn forms() -> impl Iterator<Item = Builtin> {
+    let both = |f: &'static Family| other_form(f).map(|other| [builtin(f), builtin(other)]);
+    FAMILIES.iter().filter_map(both).flatten()
+}
+
+/// The family that is another parametrisation of this one, by its last parameter.
+fn other_form(f: &Family) -> Option<&'static Family> {
+    FAMILIES.iter().find(|other| other.form_of == Some(f.name))
+}
+
+fn with_both(f: &Family, other: &Family) -> Builtin {
+    let mut args: Vec<Argument> = f.params.iter().map(argument).collect();
+    args.extend(other.params.last().map(argument));
+    let first = args.len().saturating_sub(2);
+    args[first..].iter_mut().for_each(|a| a.default = Some("none".into()));
+    Builtin { args: args.into(), kind: Kind::Distribution(by_form), scalar: None, ..builtin(f) }
+}
+
+/// A distribution of a family with two forms, from the arguments of both.
+fn by_form(a: &Args) -> Result<Dist, Fault> {
+    let name = &*a.builtin.name;
+    let family = FAMILIES.iter().find(|f| f.name == name);
+    let Some((family, other)) = family.and_then(|f| Some((f, other_form(f)?))) else {
+        return Err(Fault::type_error(format!("{name} has one form")));
+    };
+    let last = a.builtin.args.len().saturating_sub(2);
+    let (form, by) = match (a.given(last), a.given(last + 1)) {
+        (true, false) => (family, last),
+        (false, true) => (other, last + 1),
+        _ => {
+            let [p, q] = [last, last + 1].map(|i| a.builtin.args.get(i).map_or("", |p| &*p.name));
+            return Err(Fault::type_error(format!("{name}: give either `{p}` or `{q}`")));
+        }
+    };
+    let values: SmallVec<[&Value; 4]> = (0..last).chain([by]).map(|i| a.get(i)).collect();
+    reader(form.name)(&Args { builtin: &builtin(form), values: &values })
 }
 
 fn builtin(f: &Family) -> Builtin {
@@ -31,7 +74,14 @@ fn builtin(f: &Family) -> Builtin {
         args: f.params.iter().map(argument).collect(),
         scalar: scalar(f),
         drawn: f.drawn,
-        ..Builtin::from(&Row::new(kind, f.name, "Distributions", &[], Type::Dist, f.doc))
+        ..Builtin::from(&Row::new(
+            kind,
+            f.form_of.unwrap_or(f.name),
+            "Distributions",
+            &[],
+            Type::Dist,
+            f.doc,
+        ))
     }
 }
 
@@ -62,6 +112,10 @@ fn scalar(f: &Family) -> Option<Scalar> {
             make: |weights| dist::Categorical::new(Arc::clone(weights)).map(Dist::from).ok(),
             log_probability: |weights, x| dist::Categorical::log_probability(weights, x).ok(),
         }),
+        "categorical_logits" => Some(Scalar::Weights {
+            make: |logits| dist::CategoricalLogits::new(Arc::clone(logits)).map(Dist::from).ok(),
+            log_probability: |logits, x| dist::CategoricalLogits::log_probability(logits, x).ok(),
+        }),
         _ => f.numbers.map(Scalar::Family),
     }
 }
@@ -72,6 +126,7 @@ fn reader(family: &str) -> fn(&Args) -> Result<Dist, Fault> {
     match family {
         "truncated" => truncated,
         "categorical" => |a| made(dist::Categorical::new(a.array(0)?)),
+        "categorical_logits" => |a| made(dist::CategoricalLogits::new(a.array(0)?)),
         "dirichlet" => |a| made(dist::Dirichlet::new(&a.array(0)?)),
         "multinomial" => |a| made(dist::Multinomial::new(a.num(0)?, &a.array(1)?)),
         "lkj" => |a| made(dist::Lkj::new(a.num(0)?, a.num(1)?)),
@@ -95,7 +150,12 @@ fn reader(family: &str) -> fn(&Args) -> Result<Dist, Fault> {
 pub(super) fn notes(name: &str) -> Vec<(&'static str, String)> {
     let found = FAMILIES.iter().find(|f| f.name == name);
     found.map_or(Vec::new(), |f| {
-        vec![("Support", f.support.to_owned()), ("Density", f.formula.to_owned())]
+        let other = other_form(f).and_then(|o| Some((o.params.last()?.name, o.formula)));
+        let density = match other {
+            Some((by, formula)) => format!("{}; by `{by}`, {formula}", f.formula),
+            None => f.formula.to_owned(),
+        };
+        vec![("Support", f.support.to_owned()), ("Density", density)]
     })
 }
 

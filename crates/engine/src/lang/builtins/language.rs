@@ -18,12 +18,15 @@ impl Table {
             matrix::TABLE,
             definite::TABLE,
         ];
-        let rest: [&[Row]; 4] = [log_density::TABLE, covariance::TABLE, forms::TABLE, data::TABLE];
+        let rest: [&[Row]; 5] =
+            [math::NORMAL, log_density::TABLE, covariance::TABLE, forms::TABLE, data::TABLE];
         let rows = |tables: Vec<&'static [Row]>| tables.into_iter().flatten().map(Builtin::from);
         let shown = |builtin: Builtin| Builtin { example: examples::of(&builtin.name), ..builtin };
         let own = rows(functions.into()).chain(distributions::all()).chain(rows(rest.into()));
         let plans = rows(vec![plans::TABLE]);
-        Table::empty().with(own.map(shown).chain(kernels).chain(plans.map(shown)))
+        Table::empty()
+            .with(own.map(shown).chain(kernels).chain(plans.map(shown)))
+            .with_forms(distributions::forms())
     }
 }
 

@@ -8,6 +8,7 @@ use super::{Arg, ArgAdjoints, Args, Derivative, Row, Scalar, Type, arg, function
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
+use pcadlang_numerics::num;
 
 const SECTION: &str = "Math";
 
@@ -118,9 +119,33 @@ pub(super) const TABLE: &[Row] = &[
     smooth!("logit", X, "`log(p / (1 - p))`, for probabilities.", logit, |x, _| 1.0 / (x * (1.0 - x))),
     smooth!("expit", X, "`1 / (1 + exp(-x))`, the inverse of `logit`.", expit, |_, y| y * (1.0 - y)),
     smooth!("erf", X, "The error function.", libm::erf, |x, _| std::f64::consts::FRAC_2_SQRT_PI * libm::exp(-x * x)),
-    smooth!("lgamma", X, "The logarithm of the absolute value of the gamma function.", libm::lgamma, |x, _| {
-        pcadlang_numerics::num::digamma(x)
+    smooth!("erfc", X, "`1 - erf(x)`, accurate where it is small.", libm::erfc, |x, _| {
+        -std::f64::consts::FRAC_2_SQRT_PI * libm::exp(-x * x)
     }),
+    smooth!("log1m_exp", X, "`log(1 - exp(x))`, accurate for `x` near 0 and far below; -inf at 0, NaN above.", num::log1m_exp, |x, _| {
+        -1.0 / libm::expm1(-x)
+    }),
+    smooth!("lgamma", X, "The logarithm of the absolute value of the gamma function.", libm::lgamma, |x, _| {
+        num::digamma(x)
+    }),
+];
+
+/// Functions of the normal distribution, which searches find behind the distributions.
+pub(super) const NORMAL: &[Row] = &[
+    smooth!(
+        "normal_cdf",
+        X,
+        "The probability that a standard normal number is at most `x`.",
+        num::normal_cdf,
+        |x, _| { num::normal_density(x) }
+    ),
+    smooth!(
+        "log_normal_cdf",
+        X,
+        "The logarithm of `normal_cdf(x)`, also where that underflows.",
+        num::log_normal_cdf,
+        |x, _| { num::log_normal_cdf_slope(x) }
+    ),
 ];
 
 /// The partial derivatives of z = x^y.

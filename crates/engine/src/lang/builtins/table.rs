@@ -37,6 +37,17 @@ const CONSTANTS: &[Constant] = &[
 #[derive(Clone, Debug, Hash, PartialEq, Eq)]
 struct FullName(Text, Text);
 
+impl FullName {
+    fn is_form(&self) -> bool {
+        self.1.contains(' ')
+    }
+}
+
+/// The name of a form, which no program can write.
+fn form_name(name: &str, argument: &str) -> String {
+    format!("{name} {argument}")
+}
+
 /// A borrowed [`FullName`], for look-ups.
 #[derive(Hash)]
 struct Sought<'a>(&'a str, &'a str);
@@ -79,8 +90,30 @@ impl Table {
     #[must_use]
     pub fn with(mut self, more: impl IntoIterator<Item = Builtin>) -> Self {
         let more = more.into_iter();
+        // Forms stay behind what is listed.
+        let forms: Vec<Builtin> =
+            self.entries.iter().filter(|(n, _)| n.is_form()).map(|(_, b)| b.clone()).collect();
+        self.entries.retain(|n, _| !n.is_form());
         self.entries.extend(more.map(|b| (FullName(b.module.clone(), b.name.clone()), b)));
+        self.with_forms(forms)
+    }
+
+    /// The table with the forms of built-ins that calls may have, one by the name of an
+    /// argument that only it has. They are found by [`form`](Table::form) alone.
+    #[must_use]
+    pub(super) fn with_forms(mut self, forms: impl IntoIterator<Item = Builtin>) -> Self {
+        for b in forms {
+            let last = b.args.last().map_or("", |a| &*a.name);
+            let name = form_name(&b.name, last).into();
+            self.entries.insert(FullName(b.module.clone(), name), b);
+        }
         self
+    }
+
+    /// Returns the index of the form of a built-in that a call has if it gives this
+    /// argument; `None` if there is one form only.
+    pub(crate) fn form(&self, b: &Builtin, argument: &str) -> Option<u32> {
+        self.find(&b.module, &form_name(&b.name, argument))
     }
 
     /// Returns the built-in at an index from [`find`](Table::find).
@@ -96,7 +129,7 @@ impl Table {
 
     /// All of them, in the order of the reference.
     pub fn iter(&self) -> impl Iterator<Item = &Builtin> + Clone {
-        self.entries.values()
+        self.entries.iter().filter(|(name, _)| !name.is_form()).map(|(_, b)| b)
     }
 
     /// Returns the named constants: `pi`, `inf`.

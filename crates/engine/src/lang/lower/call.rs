@@ -9,6 +9,7 @@ use crate::lang::code::{BlockKind, Callee, Op, Operand, Probe};
 use crate::lang::value::Value;
 use pcadlang_syntax::ast::{Arg, Expr, ExprKind};
 use pcadlang_syntax::span::Span;
+use smallvec::SmallVec;
 use std::sync::Arc;
 
 /// What a called expression refers to.
@@ -29,8 +30,8 @@ impl Lowerer<'_> {
                     Kind::Form(form) => self.form(form, i, args, e.span),
                     Kind::Function(_) | Kind::Distribution(_) => {
                         match self.builtin_args(i, args, e.span) {
-                            Some(operands) => {
-                                self.op(Op::Prim { builtin: i, args: operands }, b.returns, e.span)
+                            Some((builtin, args)) => {
+                                self.op(Op::Prim { builtin, args }, b.returns, e.span)
                             }
                             None => self.nothing(),
                         }
@@ -92,7 +93,7 @@ impl Lowerer<'_> {
             return None;
         }
         let nothing = self.nothing().at;
-        Some((i, self.builtin_args(i, args, e.span).unwrap_or_else(|| [nothing].into())))
+        Some(self.builtin_args(i, args, e.span).unwrap_or_else(|| (i, [nothing].into())))
     }
 
     fn target(&mut self, callee: &Expr) -> Target {
@@ -156,11 +157,57 @@ impl Lowerer<'_> {
         args.iter().map(|a| one(self, a)).collect()
     }
 
-    /// Lowers the arguments of a built-in, in the table's order.
-    pub fn builtin_args(&mut self, i: u32, args: &[Arg], span: Span) -> Option<Box<[Operand]>> {
+    /// Finds the form of a built-in that a call has: exactly one of the last two arguments
+    /// is to be given. Keeps those of that form in the order.
+    fn form_called(
+        &mut self,
+        i: u32,
+        (args, span): (&[Arg], Span),
+        order: &mut SmallVec<[Option<usize>; 8]>,
+    ) -> Option<u32> {
         let table = Arc::clone(&self.code.builtins);
         let b = table.get(i);
-        let order = match b.match_names(args.iter().map(|a| a.name.as_ref().map(|n| &*n.node))) {
+        let [.., one, other] = &*b.args else { return Some(i) };
+        let forms = table.form(b, &one.name).zip(table.form(b, &other.name));
+        let Some((by_one, by_other)) = forms else { return Some(i) };
+        let last = order.len() - 2;
+        let (form, unused) = match (order[last], order[last + 1]) {
+            (Some(_), None) => (by_one, last + 1),
+            (None, Some(_)) => (by_other, last),
+            (given, again) => {
+                let (p, q) = (&one.name, &other.name);
+                let both = given.max(again).and_then(|j| args.get(j));
+                let e = match both {
+                    Some(a) => {
+                        let at = a.name.as_ref().map_or(a.value.span, |n| n.span);
+                        let message = format!("`{}` takes `{p}` or `{q}`, not both", b.name);
+                        self.error(message, at, "the other one is given too")
+                    }
+                    None => {
+                        let message = format!("`{}` needs `{p}` or `{q}`", b.name);
+                        self.error(message, span, "in this call")
+                    }
+                };
+                e.hint_also(b.signature());
+                self.written(args);
+                return None;
+            }
+        };
+        order.remove(unused);
+        Some(form)
+    }
+
+    /// Lowers the arguments of a built-in, in the order of the form that is called.
+    pub fn builtin_args(
+        &mut self,
+        i: u32,
+        args: &[Arg],
+        span: Span,
+    ) -> Option<(u32, Box<[Operand]>)> {
+        let table = Arc::clone(&self.code.builtins);
+        let b = table.get(i);
+        let names = args.iter().map(|a| a.name.as_ref().map(|n| &*n.node));
+        let mut order = match b.match_names(names) {
             Ok(order) => order,
             Err(message) => {
                 self.mismatch(b, message, args, span);
@@ -168,6 +215,8 @@ impl Lowerer<'_> {
                 return None;
             }
         };
+        let i = self.form_called(i, (args, span), &mut order)?;
+        let b = table.get(i);
         let values: Vec<Typed> = args.iter().map(|a| self.expr(&a.value)).collect();
         let mut operands = Vec::with_capacity(order.len());
         for (p, from) in order.iter().enumerate() {
@@ -208,7 +257,7 @@ impl Lowerer<'_> {
                 }
             }
         }
-        Some(operands.into())
+        Some((i, operands.into()))
     }
 
     fn maybe(&mut self, e: Option<&Expr>) -> Typed {

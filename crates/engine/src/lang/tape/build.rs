@@ -490,7 +490,9 @@ impl Builder {
         // Only `flip` takes booleans; other families take numbers, and `flip` takes the
         // numbers 0 and 1 only.
         let kind = match one_of(dist) {
-            Dist::Flip(_) => matches!(x, Form::Fixed(v) if is_bools(v) || is_zeros_and_ones(v)),
+            Dist::Flip(_) | Dist::FlipLogit(_) => {
+                matches!(x, Form::Fixed(v) if is_bools(v) || is_zeros_and_ones(v))
+            }
             _ => !matches!(x, Form::Fixed(v) if is_bools(v)),
         };
         if !fits || !(fixed || own_columns) || !kind {

@@ -85,10 +85,12 @@ impl Tape {
     }
 
     /// Runs it with these values of its inputs, given by their number, and returns the
-    /// coordinates in `y`. False if it cannot evaluate the program there.
+    /// coordinates in `y`: `coarse` gives those that values do not tell. False if it cannot
+    /// evaluate the program there.
     pub fn run_at_values(
         &mut self,
         mut value: impl FnMut(usize) -> Value,
+        coarse: impl Fn(usize, &Support, f64) -> Option<f64>,
         y: &mut Vec<f64>,
     ) -> bool {
         self.sums = ScoreSums::default();
@@ -98,6 +100,11 @@ impl Tape {
             let (x, from) = (value(i), y.len());
             let Some(datum) = x.to_datum() else { return false };
             input.support.to_free(&datum, y);
+            if let (Support::Pole { .. }, Datum::Num(x), [y]) =
+                (&input.support, &datum, &mut y[from..])
+            {
+                *y = coarse(i, &input.support, *x).unwrap_or(*y);
+            }
             let jacobian = match y[from..] {
                 [y] if matches!(input.form, Form::Num(_)) => input.support.from_free_scalar(y).1,
                 ref own => input.support.from_free(own).1,
@@ -127,7 +134,7 @@ impl Tape {
             let jacobian = match (&input.form, own) {
                 (Form::Num(at), [y]) => {
                     let x = input.support.from_free_scalar(*y).0;
-                    let back = input.support.to_free_scalar(x);
+                    let back = input.support.settled(*y, input.support.to_free_scalar(x));
                     self.values.numbers[*at] = x;
                     here.push(back);
                     input.support.from_free_scalar(back).1
@@ -135,6 +142,9 @@ impl Tape {
                 (form, own) => {
                     let (x, from) = (input.support.from_free(own).0, here.len());
                     input.support.to_free(&x, here);
+                    if let ([y], [back]) = (own, &mut here[from..]) {
+                        *back = input.support.settled(*y, *back);
+                    }
                     if !form.write(&mut self.values, &Value::from_datum(&x)) {
                         return false;
                     }
@@ -156,7 +166,8 @@ impl Tape {
             match (&input.support, own) {
                 (Support::Real, _) => true,
                 (support, [y]) if matches!(input.form, Form::Num(_)) => {
-                    support.to_free_scalar(support.from_free_scalar(*y).0) == *y
+                    support.settled(*y, support.to_free_scalar(support.from_free_scalar(*y).0))
+                        == *y
                 }
                 (support, own) => {
                     back.clear();
@@ -215,6 +226,19 @@ impl Tape {
             let (own, after) = rest.split_at(input.dimension.min(rest.len()));
             rest = after;
             input.support.from_free(own).0
+        })
+    }
+
+    /// Returns, for each input, its coordinate if its value need not tell it.
+    pub fn coarse(&self, y: &[f64]) -> impl Iterator<Item = Option<f64>> {
+        let mut rest = y;
+        self.inputs.iter().map(move |input| {
+            let (own, after) = rest.split_at(input.dimension.min(rest.len()));
+            rest = after;
+            match (&input.support, own) {
+                (Support::Pole { .. }, [y]) if Support::COARSE.contains(y) => Some(*y),
+                _ => None,
+            }
         })
     }
 

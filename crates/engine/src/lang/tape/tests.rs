@@ -62,7 +62,7 @@ fn densities_and_gradients_are_those_of_the_formula() {
     }
     // The coordinates of a given value are returned.
     let mut y = Vec::new();
-    assert!(tape.run_at_values(|_| Value::Num(1.5), &mut y));
+    assert!(tape.run_at_values(|_| Value::Num(1.5), |_, _, _| None, &mut y));
     assert_eq!(y, [libm::log(1.5)]);
 }
 

@@ -8,7 +8,7 @@
 use super::in_place::InPlace;
 use crate::lang::tape::{ScoreSums, Tape};
 use crate::trace::{Change, Draws, NONE, Target, Trace, Weight};
-use pcadlang_numerics::dist::Datum;
+use pcadlang_numerics::dist::{Datum, Support};
 use pcadlang_numerics::num::ExactSum;
 use pcadlang_numerics::rng::Stream;
 use std::sync::Arc;
@@ -145,7 +145,9 @@ impl Recording {
                 (v, i) => v.element(i as usize).unwrap_or_default(),
             }
         };
-        let recorded = self.tape.run_at_values(now, y);
+        let coarse =
+            |i: usize, support: &Support, x: f64| trace.coarse_coordinate(targets[i], support, x);
+        let recorded = self.tape.run_at_values(now, coarse, y);
         self.start.clone_from(self.tape.sums());
         recorded
     }
@@ -173,7 +175,13 @@ impl Recording {
 
     /// Appends the changes that move the state to these coordinates.
     pub fn changes(&self, y: &[f64], out: &mut Vec<(Target, Change)>) {
-        out.extend(self.targets.iter().copied().zip(self.tape.images(y).map(Change::Set)));
+        // A value need not tell its coordinate.
+        let change = |(x, coarse): (Datum, Option<f64>)| match coarse {
+            Some(y) => Change::Free(vec![y]),
+            None => Change::Set(x),
+        };
+        let all = self.tape.images(y).zip(self.tape.coarse(y)).map(change);
+        out.extend(self.targets.iter().copied().zip(all));
     }
 
     /// Moves the trace to these coordinates in place, with the same result as a proposal of
@@ -188,6 +196,7 @@ impl Recording {
             && in_place.fits(&trace.graph, &trace.code, &self.tape, &[]);
         if moved {
             in_place.apply(&mut trace.graph, &trace.code, &self.tape, &[], Some(&self.start));
+            trace.keep_moved(&self.targets, self.tape.coarse(here));
             self.start.clone_from(self.tape.sums());
             self.revision = trace.graph.revision;
             self.here = Some(here.clone());
@@ -227,6 +236,7 @@ impl Recording {
             }
             trace.commit();
             in_place.apply(&mut trace.graph, &trace.code, &self.tape, &drawn, None);
+            trace.keep_moved(&self.targets, self.tape.coarse(here));
             self.start.clone_from(self.tape.sums());
         }
         trace.commit();

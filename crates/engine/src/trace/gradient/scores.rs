@@ -6,6 +6,7 @@ use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::Args;
 use crate::lang::code::{DistSpec, Op};
 use crate::lang::density;
+use crate::lang::error::FaultKind;
 use crate::lang::value::Value;
 use crate::trace::node::*;
 use crate::trace::update::Failure;
@@ -51,7 +52,7 @@ impl Reverse<'_> {
                 let Some((mut by_x, mut params)) =
                     density::gradient(&dist, &Value::from_datum(&stored))
                 else {
-                    return Err(self.no_derivative(n, &format!("the density of `{}`", dist.name())));
+                    return Err(self.no_density_derivative(n, &dist, &Value::from_datum(&stored)));
                 };
                 by_x.scale(self.weight);
                 params.iter_mut().for_each(|p| *p *= self.weight);
@@ -78,7 +79,7 @@ impl Reverse<'_> {
                 }
                 let dist = g.make_dist(code, n, frame, spec, &mut deps)?;
                 let Some((mut by_x, mut params)) = density::gradient(&dist, observed) else {
-                    return Err(self.no_derivative(n, &format!("the density of `{}`", dist.name())));
+                    return Err(self.no_density_derivative(n, &dist, observed));
                 };
                 by_x.scale(self.power);
                 params.iter_mut().for_each(|p| *p *= self.power);
@@ -95,6 +96,17 @@ impl Reverse<'_> {
             _ => {}
         }
         Ok(())
+    }
+
+    /// Returns the failure of a density without derivatives: of the state, which kernels
+    /// reject, if the density is not finite there, otherwise of the program.
+    fn no_density_derivative(&self, n: NodeId, dist: &Dist, x: &Value) -> Failure {
+        let finite = density::pointwise(dist, x).iter().all(|score| score.is_finite());
+        if finite {
+            return self.no_derivative(n, &format!("the density of `{}`", dist.name()));
+        }
+        let message = format!("the density of `{}` is not finite here", dist.name());
+        self.graph.fail(self.code, n, FaultKind::Domain, message, None)
     }
 
     /// Adds the derivatives with respect to a distribution's parameters to the nodes they

@@ -198,7 +198,10 @@ impl Summed {
             let base = f64::from(u8::from(k == 0));
             let weight = |n: u32| trace.group_of(elimination, n).map_or(base, |i| weights[i]);
             part.clear();
-            trace.weighted_gradient(targets, at.power, &weight, &mut part)?;
+            let force = trace.weighted_gradient(targets, at.power, &weight, &mut part);
+            if recoverable(force)?.is_none() {
+                return Ok(None);
+            }
             point.gradient.iter_mut().zip(&part).for_each(|(g, p)| *g += p);
         }
         // Each evaluation includes the Jacobians, which count only once.

@@ -122,7 +122,10 @@ impl<'a> System<'a> {
         }
         if !taped {
             system.memory.give_up();
-            system.force(point)?;
+            if !system.force(point)? {
+                system.memory.keep(&here);
+                return Ok(None);
+            }
         }
         system.memory.keep(&here);
         Ok(system.usable(here))
@@ -142,9 +145,11 @@ impl<'a> System<'a> {
         &self.layout.signature
     }
 
-    fn force(&mut self, point: &mut Point) -> TraceResult<()> {
+    /// Fills in the force; false if it does not exist in this state.
+    fn force(&mut self, point: &mut Point) -> TraceResult<bool> {
         point.gradient.clear();
-        self.trace.gradient(&self.layout.targets, self.at.power, &mut point.gradient)
+        let force = self.trace.gradient(&self.layout.targets, self.at.power, &mut point.gradient);
+        Ok(recoverable(force)?.is_some() && point.gradient.iter().all(|g| g.is_finite()))
     }
 
     /// Fills in the log density and force at a point; false if they do not exist.
@@ -172,8 +177,7 @@ impl<'a> System<'a> {
         }
         let Some(log_density) = self.propose(&point.y, false)? else { return Ok(false) };
         point.log_density = log_density;
-        self.force(point)?;
-        Ok(point.gradient.iter().all(|g| g.is_finite()))
+        self.force(point)
     }
 
     /// Does something with proposals of all values of the choices that are summed out, for

@@ -74,8 +74,13 @@ impl Scalar for Beta {
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let own = self.log_density_num(x);
         let tails = |a, b| beta_tails(a, b, x, 1.0 - x).map(Tails::from);
-        let by_a = speed_by_differences(self.a, own, |a| tails(a, self.b))?;
-        Some(smallvec![by_a, speed_by_differences(self.b, own, |b| tails(self.a, b))?])
+        let by_a = speed_by_differences(self.a, own, |a| tails(a, self.b));
+        Some(smallvec![by_a, speed_by_differences(self.b, own, |b| tails(self.a, b))])
+    }
+
+    #[inline]
+    fn upper_pole(&self) -> Option<f64> {
+        (self.b < 1.0).then_some(self.b)
     }
 
     fn number_mean(&self) -> Option<f64> {

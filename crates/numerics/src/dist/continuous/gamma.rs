@@ -72,7 +72,7 @@ impl Scalar for Gamma {
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let own = self.log_density_num(x);
         let tails = |a| gamma_tails(a, self.rate * x).map(Tails::from);
-        Some(smallvec![speed_by_differences(self.shape, own, tails)?, x / self.rate])
+        Some(smallvec![speed_by_differences(self.shape, own, tails), x / self.rate])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -74,7 +74,7 @@ impl Scalar for InvGamma {
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let own = self.log_density_num(x);
         let tails = |a| gamma_tails(a, self.scale / x).map(|t| Tails::from(t).swapped());
-        Some(smallvec![speed_by_differences(self.shape, own, tails)?, -x / self.scale])
+        Some(smallvec![speed_by_differences(self.shape, own, tails), -x / self.scale])
     }
 
     fn number_mean(&self) -> Option<f64> {

@@ -9,6 +9,10 @@ use core::f64::consts::LN_2;
 /// The largest number of integers that are summed one by one.
 const FEW: f64 = 64.0;
 
+/// The least logarithm of an interval's probability. The log density is a difference of two
+/// logarithms of that size; below, rounding would make up densities.
+const LEAST_LOG_MASS: f64 = -1e13;
+
 /// The number of draws that are tried before the distribution function is inverted.
 const TRIES: u32 = 64;
 
@@ -100,10 +104,10 @@ impl Truncated {
         let support = within(&support, lo, hi).ok_or_else(|| nothing(outside))?;
         let mut d = Truncated { base, lo, hi, support, log_mass: 0.0 };
         d.log_mass = d.log_mass_to(f64::INFINITY).ok_or_else(|| unknown(&d.base))?;
-        if d.log_mass > f64::NEG_INFINITY {
+        if d.log_mass > LEAST_LOG_MASS {
             Ok(d)
         } else {
-            let rule = "must contain some of the probability of `d`, more than the smallest double";
+            let rule = "must contain some of the probability of `d`, more than exp(-1e13)";
             Err(Truncated::bad("lo to hi", format!("{lo} and {hi} of {}", d.base.name()), rule))
         }
     }
@@ -232,8 +236,8 @@ impl Truncated {
         }
         for (x, sign) in [(b, 1.0), (a, -1.0)] {
             let density = self.base.log_density_num(x);
-            if density.is_finite() && !self.is_end_of_base(x) {
-                let weight = sign * libm::exp(density - self.log_mass);
+            let weight = sign * libm::exp(density - self.log_mass);
+            if weight != 0.0 && density.is_finite() && !self.is_end_of_base(x) {
                 let cdf_slopes = self.base.cdf_slopes(x)?;
                 sum.iter_mut().zip(&cdf_slopes).for_each(|(s, v)| *s += weight * v);
             }
@@ -322,7 +326,16 @@ impl Distribution for Truncated {
         };
         let own = self.own_bounds();
         g.params.extend([at(self.lo, own.0), -at(self.hi, own.1)]);
-        g.params.iter().all(|p| p.is_finite()).then_some(g)
+        Some(g)
+    }
+
+    fn param_count(&self) -> usize {
+        self.base.param_count() + 2
+    }
+
+    fn pole(&self) -> Option<f64> {
+        let hi = |s: &Support| ends(s).map(|(_, hi)| hi);
+        self.base.pole().filter(|_| hi(&self.support) == hi(&self.base.support()))
     }
 
     fn has_moving_support(&self) -> bool {
@@ -331,11 +344,9 @@ impl Distribution for Truncated {
 
     fn by_bounds(&self, lo: f64, hi: f64) -> Option<Vec<f64>> {
         let (own_lo, own_hi) = self.own_bounds();
-        if self.base.has_moving_support() && !(own_lo && own_hi) {
-            return None;
-        }
-        let mut by = vec![0.0; self.base.param_count()];
-        by.extend([if own_lo { lo } else { 0.0 }, if own_hi { hi } else { 0.0 }]);
+        let (of_lo, of_hi) = (if own_lo { lo } else { 0.0 }, if own_hi { hi } else { 0.0 });
+        let mut by = self.base.by_ends(lo - of_lo, hi - of_hi)?;
+        by.extend([of_lo, of_hi]);
         Some(by)
     }
 

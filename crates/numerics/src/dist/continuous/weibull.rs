@@ -71,11 +71,17 @@ impl Scalar for Weibull {
         if x <= 0.0 {
             return Some(Tails::NONE_BELOW);
         }
-        Some(Tails::from_above(-libm::exp(self.shape * libm::log(x / self.scale))))
+        let power = self.shape * self.log_ratio(x);
+        let fall = libm::exp(power);
+        // ln(1 - e^-fall) where the probability below may be less than the smallest double.
+        match fall < 1e-8 {
+            true => Some(Tails { below: power - 0.5 * fall, above: -fall }),
+            false => Some(Tails::from_above(-fall)),
+        }
     }
 
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
-        Some(smallvec![x / self.shape * libm::log(x / self.scale), -x / self.scale])
+        Some(smallvec![x / self.shape * self.log_ratio(x), -x / self.scale])
     }
 
     fn number_mean(&self) -> Option<f64> {

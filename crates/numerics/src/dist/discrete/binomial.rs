@@ -3,22 +3,36 @@
 //! "The generation of binomial random variates", BTRS).
 
 use crate::dist::*;
-use crate::num::{LN_SQRT_2PI, beta_tails, deviance, stirling_error};
+use crate::num::{LN_SQRT_2PI, beta_tails, deviance, expit, ln_choose, log1p_exp, stirling_error};
 
 /// `binomial(n, p)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Binomial {
     n: f64,
     p: f64,
+    /// The probability of failure.
+    q: f64,
     error: f64,
 }
 
 impl Binomial {
     pub(in crate::dist) fn of(n: f64, p: f64) -> Result<Binomial, ParamError> {
+        Binomial::with(n, p, 1.0 - p)
+    }
+
+    fn with(n: f64, p: f64, q: f64) -> Result<Binomial, ParamError> {
         if n < 0.0 {
             return Err(Self::bad("n", n, "must not be negative"));
         }
-        Ok(Binomial { n, p, error: if n > 0.0 { stirling_error(n) } else { 0.0 } })
+        Ok(Binomial { n, p, q, error: if n > 0.0 { stirling_error(n) } else { 0.0 } })
+    }
+
+    /// Returns the log probability of 0 < k < n, where neither probability underflows.
+    fn within(&self, k: f64) -> f64 {
+        let (n, l) = (self.n, self.n - k);
+        let errors = self.error - stirling_error(k) - stirling_error(l);
+        let deviances = deviance(k, n * self.p) + deviance(l, n * self.q);
+        errors - deviances - LN_SQRT_2PI - 0.5 * (libm::log(k) + libm::log(l / n))
     }
 
     /// Draws a number of successes, for p <= 1/2.
@@ -44,7 +58,7 @@ impl Binomial {
         let a = -0.0873 + 0.0248 * b + 0.01 * p;
         let squeeze = 0.92 - 4.2 / b;
         let alpha = (2.83 + 5.1 / b) * spread;
-        let own = Binomial { p, ..*self };
+        let own = Binomial { p, q: 1.0 - p, ..*self };
         let at_mode = own.log_density_num(libm::floor((n + 1.0) * p));
         loop {
             let u = rng.open_uniform() - 0.5;
@@ -70,11 +84,7 @@ impl Scalar for Binomial {
     }
 
     fn draw(&self, rng: &mut Stream) -> f64 {
-        if self.p <= 0.5 {
-            self.draw_few(self.p, rng)
-        } else {
-            self.n - self.draw_few(1.0 - self.p, rng)
-        }
+        if self.p <= 0.5 { self.draw_few(self.p, rng) } else { self.n - self.draw_few(self.q, rng) }
     }
 
     fn log_density_num(&self, k: f64) -> f64 {
@@ -95,15 +105,12 @@ impl Scalar for Binomial {
         if k == n {
             return n * if p > 0.5 { libm::log1p(p - 1.0) } else { libm::log(p) };
         }
-        let l = n - k;
-        let errors = self.error - stirling_error(k) - stirling_error(l);
-        let deviances = deviance(k, n * p) + deviance(l, n * (1.0 - p));
-        errors - deviances - LN_SQRT_2PI - 0.5 * (libm::log(k) + libm::log(l / n))
+        self.within(k)
     }
 
     fn slope(&self, k: f64) -> Slope {
         let up = if k > 0.0 { k / self.p } else { 0.0 };
-        let down = if k < self.n { (self.n - k) / (1.0 - self.p) } else { 0.0 };
+        let down = if k < self.n { (self.n - k) / self.q } else { 0.0 };
         Slope::discrete([0.0, up - down])
     }
 
@@ -115,11 +122,11 @@ impl Scalar for Binomial {
         if k >= self.n {
             return Some(Tails::ALL_BELOW);
         }
-        beta_tails(self.n - k, k + 1.0, 1.0 - self.p, self.p).map(Tails::from)
+        beta_tails(self.n - k, k + 1.0, self.q, self.p).map(Tails::from)
     }
 
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
-        Some(smallvec![0.0, -(self.n - x) / (1.0 - self.p)])
+        Some(smallvec![0.0, -(self.n - x) / self.q])
     }
 
     fn number_mean(&self) -> Option<f64> {
@@ -127,6 +134,67 @@ impl Scalar for Binomial {
     }
 
     fn number_sd(&self) -> Option<f64> {
-        Some((self.n * self.p * (1.0 - self.p)).sqrt())
+        Some((self.n * self.p * self.q).sqrt())
+    }
+}
+
+/// `binomial(n, logit = l)`: with the log odds `l` of success.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BinomialLogit {
+    by_p: Binomial,
+    logit: f64,
+}
+
+impl BinomialLogit {
+    pub(in crate::dist) fn of(n: f64, logit: f64) -> Result<BinomialLogit, ParamError> {
+        Ok(BinomialLogit { by_p: Binomial::with(n, expit(logit), expit(-logit))?, logit })
+    }
+}
+
+impl Scalar for BinomialLogit {
+    fn number_support(&self) -> Support {
+        self.by_p.number_support()
+    }
+
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        self.by_p.draw(rng)
+    }
+
+    fn log_density_num(&self, k: f64) -> f64 {
+        let (n, logit) = (self.by_p.n, self.logit);
+        if !((0.0..=n).contains(&k) && k == libm::trunc(k)) {
+            return f64::NEG_INFINITY;
+        }
+        // Without the terms of outcomes that do not occur. Where a probability is far below
+        // the precision of the other one, the binomial coefficient does not cancel.
+        let some = |count: f64, logit: f64| match count {
+            0.0 => 0.0,
+            count => -count * log1p_exp(-logit),
+        };
+        match k > 0.0 && k < n && logit.abs() < 300.0 {
+            true => self.by_p.within(k),
+            false => ln_choose(n, k) + some(k, logit) + some(n - k, -logit),
+        }
+    }
+
+    fn slope(&self, k: f64) -> Slope {
+        let Binomial { n, p, q, .. } = self.by_p;
+        Slope::discrete([0.0, k * q - (n - k) * p])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        Scalar::tails(&self.by_p, x)
+    }
+
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
+        Some(smallvec![0.0, -(self.by_p.n - x) * self.by_p.p])
+    }
+
+    fn number_mean(&self) -> Option<f64> {
+        self.by_p.number_mean()
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        self.by_p.number_sd()
     }
 }

@@ -1,6 +1,7 @@
 //! The categorical distribution: an index drawn in proportion to weights.
 
 use crate::dist::*;
+use crate::num::log_sum_exp;
 
 /// `categorical(weights)`: 0, 1, … with these weights, which need not sum to 1.
 #[derive(Clone, Debug, PartialEq)]
@@ -118,5 +119,107 @@ impl Scalar for Categorical {
                 .sum::<f64>()
                 .sqrt(),
         )
+    }
+}
+
+/// `categorical(logits = l)`: 0, 1, … with weights whose logarithms these are; -inf is a
+/// weight of 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CategoricalLogits {
+    logits: Arc<[f64]>,
+    log_total: f64,
+}
+
+impl CategoricalLogits {
+    /// Creates the distribution; fails unless the logarithms are numbers below inf, not all
+    /// of them -inf.
+    pub fn new(logits: impl Into<Arc<[f64]>>) -> Result<CategoricalLogits, ParamError> {
+        let logits = logits.into();
+        let log_total = log_total(&logits)?;
+        Ok(CategoricalLogits { logits, log_total })
+    }
+
+    /// Returns the log probability of a number under borrowed logarithms.
+    pub fn log_probability(logits: &[f64], x: f64) -> Result<f64, ParamError> {
+        log_total(logits).map(|total| by_logits(logits, total, x))
+    }
+
+    /// Returns the probability of index `i`.
+    fn probability(&self, i: usize) -> f64 {
+        libm::exp(by_logits(&self.logits, self.log_total, i as f64))
+    }
+}
+
+fn log_total(logits: &[f64]) -> Result<f64, ParamError> {
+    if let Some(l) = logits.iter().find(|l| l.is_nan() || **l == f64::INFINITY) {
+        return Err(CategoricalLogits::bad("logits", l, "must be numbers below inf"));
+    }
+    match log_sum_exp(logits) {
+        total if total.is_finite() => Ok(total),
+        total => Err(CategoricalLogits::bad("logits", total, "must have a finite log_sum_exp")),
+    }
+}
+
+#[inline]
+fn by_logits(logits: &[f64], total: f64, x: f64) -> f64 {
+    let i = x as usize;
+    match logits.get(i) {
+        Some(l) if i as f64 == x => l - total,
+        _ => f64::NEG_INFINITY,
+    }
+}
+
+impl Scalar for CategoricalLogits {
+    fn number_support(&self) -> Support {
+        Support::Integers { lo: 0, hi: Some(self.logits.len() as i64 - 1) }
+    }
+
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        let weights: Vec<f64> = (0..self.logits.len()).map(|i| self.probability(i)).collect();
+        rng.weighted(&weights, weights.iter().sum()) as f64
+    }
+
+    #[inline]
+    fn log_density_num(&self, x: f64) -> f64 {
+        by_logits(&self.logits, self.log_total, x)
+    }
+
+    fn slope(&self, x: f64) -> Slope {
+        let mut slope = Slope::discrete([]);
+        slope.params.extend((0..self.logits.len()).map(|i| -self.probability(i)));
+        if let Some(own) = slope.params.get_mut(x as usize) {
+            // One minus the probability, from those of the others.
+            let but = |l: &[f64]| libm::exp(log_sum_exp(l) - self.log_total);
+            let (before, after) = self.logits.split_at(x as usize);
+            *own = but(before) + but(&after[1..]);
+        }
+        slope
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        let split = (libm::floor(x).max(-1.0) + 1.0) as usize;
+        let (below, above) = self.logits.split_at(split.min(self.logits.len()));
+        let part = |all: &[f64]| (log_sum_exp(all) - self.log_total).min(0.0);
+        Some(Tails { below: part(below), above: part(above) })
+    }
+
+    fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
+        let split = (libm::floor(x).max(-1.0) + 1.0) as usize;
+        let (own, t) = (self.log_density_num(x), Scalar::tails(self, x)?);
+        let by = |(i, l): (usize, &f64)| {
+            let share = l - self.log_total - own;
+            if i < split { libm::exp(share + t.above) } else { -libm::exp(share + t.below) }
+        };
+        Some(self.logits.iter().enumerate().map(by).collect())
+    }
+
+    fn number_mean(&self) -> Option<f64> {
+        Some((0..self.logits.len()).map(|i| i as f64 * self.probability(i)).sum())
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        let mean = self.number_mean()?;
+        let term = |i: usize| (i as f64 - mean) * (i as f64 - mean) * self.probability(i);
+        Some((0..self.logits.len()).map(term).sum::<f64>().sqrt())
     }
 }

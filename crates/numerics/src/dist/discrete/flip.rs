@@ -2,6 +2,7 @@
 
 use crate::dist::batch::Member;
 use crate::dist::*;
+use crate::num::{expit, log1p_exp};
 
 /// `flip(p)`: true with probability `p`. Observed numbers 1 and 0 count as true and
 /// false.
@@ -21,22 +22,21 @@ impl Flip {
         if x { libm::log(self.p) } else { libm::log1p(-self.p) }
     }
 
-    /// Converts an observed value to a truth value: data often use 1 and 0 for true and
-    /// false.
-    fn truth(x: &Datum) -> Option<bool> {
-        match x {
-            Datum::Bool(x) => Some(*x),
-            Datum::Num(1.0) => Some(true),
-            Datum::Num(0.0) => Some(false),
-            _ => None,
-        }
-    }
-
     /// Returns the derivative of the log probability with respect to `p`, where it is
     /// finite.
     #[inline]
     fn by_p(&self, x: bool) -> f64 {
         if x { 1.0 / self.p } else { -1.0 / (1.0 - self.p) }
+    }
+}
+
+/// Converts an observed value to a truth value: data often use 1 and 0 for true and false.
+fn truth(x: &Datum) -> Option<bool> {
+    match x {
+        Datum::Bool(x) => Some(*x),
+        Datum::Num(1.0) => Some(true),
+        Datum::Num(0.0) => Some(false),
+        _ => None,
     }
 }
 
@@ -68,11 +68,11 @@ impl Distribution for Flip {
 
     #[inline]
     fn log_density(&self, x: &Datum) -> f64 {
-        Flip::truth(x).map_or(f64::NEG_INFINITY, |x| self.log_probability(x))
+        truth(x).map_or(f64::NEG_INFINITY, |x| self.log_probability(x))
     }
 
     fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        let x = Flip::truth(x).filter(|x| self.log_probability(*x).is_finite())?;
+        let x = truth(x).filter(|x| self.log_probability(*x).is_finite())?;
         Some(Gradient { x: Vec::new(), params: vec![self.by_p(x)] })
     }
 
@@ -82,5 +82,74 @@ impl Distribution for Flip {
 
     fn sd(&self) -> Option<f64> {
         Some((self.p * (1.0 - self.p)).sqrt())
+    }
+}
+
+/// `flip(logit = l)`: true with the log odds `l`, whose probabilities keep their digits
+/// where `p` would round to 0 or 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlipLogit {
+    logit: f64,
+}
+
+impl FlipLogit {
+    pub(in crate::dist) fn of(logit: f64) -> Result<FlipLogit, ParamError> {
+        Ok(FlipLogit { logit })
+    }
+
+    /// Returns the log probability of a truth value.
+    #[inline]
+    pub fn log_probability(&self, x: bool) -> f64 {
+        -log1p_exp(if x { -self.logit } else { self.logit })
+    }
+
+    /// Returns the derivative of the log probability with respect to the log odds.
+    #[inline]
+    fn by_logit(&self, x: bool) -> f64 {
+        if x { expit(-self.logit) } else { -expit(self.logit) }
+    }
+}
+
+/// Truth values count as 1 and 0.
+impl Member<1> for FlipLogit {
+    #[inline]
+    fn log_density(&self, x: f64) -> f64 {
+        self.log_probability(x != 0.0)
+    }
+
+    #[inline]
+    fn slopes(&self, x: f64) -> (f64, [f64; 1]) {
+        (0.0, [self.by_logit(x != 0.0)])
+    }
+}
+
+impl Distribution for FlipLogit {
+    fn name(&self) -> &'static str {
+        Self::NAME
+    }
+
+    fn support(&self) -> Support {
+        Support::Boolean
+    }
+
+    fn sample(&self, rng: &mut Stream) -> Datum {
+        Datum::Bool(rng.uniform() < expit(self.logit))
+    }
+
+    #[inline]
+    fn log_density(&self, x: &Datum) -> f64 {
+        truth(x).map_or(f64::NEG_INFINITY, |x| self.log_probability(x))
+    }
+
+    fn gradient(&self, x: &Datum) -> Option<Gradient> {
+        Some(Gradient { x: Vec::new(), params: vec![self.by_logit(truth(x)?)] })
+    }
+
+    fn mean(&self) -> Option<f64> {
+        Some(expit(self.logit))
+    }
+
+    fn sd(&self) -> Option<f64> {
+        Some((expit(self.logit) * expit(-self.logit)).sqrt())
     }
 }

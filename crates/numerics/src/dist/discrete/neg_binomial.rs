@@ -72,7 +72,7 @@ impl Scalar for NegBinomial {
 
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let tails = |r| beta_tails(r, x + 1.0, self.p, 1.0 - self.p).map(Tails::from);
-        let by_r = speed_by_differences(self.r, self.log_density_num(x), tails)?;
+        let by_r = speed_by_differences(self.r, self.log_density_num(x), tails);
         Some(smallvec![by_r, (self.r + x) / self.p])
     }
 

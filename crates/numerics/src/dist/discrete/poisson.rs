@@ -2,8 +2,9 @@
 //! inversion for small rates, otherwise transformed rejection (Hörmann 1993, "The
 //! transformed rejection method for generating Poisson random variables", PTRS).
 
+use crate::dist::param::MAX_INTEGER;
 use crate::dist::*;
-use crate::num::{LN_SQRT_2PI, deviance, gamma_tails, stirling_error};
+use crate::num::{LN_SQRT_2PI, deviance, gamma_tails, ln_factorial, stirling_error};
 
 /// `poisson(rate)`; always 0 if the rate is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,5 +91,58 @@ impl Scalar for Poisson {
 
     fn number_sd(&self) -> Option<f64> {
         Some(self.rate.sqrt())
+    }
+}
+
+/// `poisson(log = l)`: with the rate exp(l).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoissonLog {
+    log: f64,
+    by_rate: Poisson,
+}
+
+impl PoissonLog {
+    pub(in crate::dist) fn of(log: f64) -> Result<PoissonLog, ParamError> {
+        match libm::exp(log) {
+            rate if rate <= MAX_INTEGER => Ok(PoissonLog { log, by_rate: Poisson { rate } }),
+            _ => Err(Self::bad("log", log, "must be at most log(2^53)")),
+        }
+    }
+}
+
+impl Scalar for PoissonLog {
+    const SUPPORT: Support = Poisson::SUPPORT;
+
+    fn draw(&self, rng: &mut Stream) -> f64 {
+        self.by_rate.draw(rng)
+    }
+
+    fn log_density_num(&self, k: f64) -> f64 {
+        let here = k > 0.0 && k.is_finite() && k == libm::trunc(k);
+        match here && self.log < -300.0 {
+            // The rate underflows, or nearly, and nothing cancels.
+            true => k * self.log - ln_factorial(k),
+            false => self.by_rate.log_density_num(k),
+        }
+    }
+
+    fn slope(&self, k: f64) -> Slope {
+        Slope::discrete([k - self.by_rate.rate])
+    }
+
+    fn tails(&self, x: f64) -> Option<Tails> {
+        Scalar::tails(&self.by_rate, x)
+    }
+
+    fn cdf_slopes(&self, _x: f64) -> Option<CdfSlopes> {
+        Some(smallvec![-self.by_rate.rate])
+    }
+
+    fn number_mean(&self) -> Option<f64> {
+        self.by_rate.number_mean()
+    }
+
+    fn number_sd(&self) -> Option<f64> {
+        self.by_rate.number_sd()
     }
 }

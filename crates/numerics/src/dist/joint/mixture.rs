@@ -177,8 +177,7 @@ impl Distribution for Mixture {
                 None => g.params.extend(std::iter::repeat_n(0.0, c.param_count())),
             }
         }
-        let finite = g.x.iter().chain(&g.params).all(|g| !g.is_nan());
-        finite.then_some(g)
+        Some(g)
     }
 
     fn mean(&self) -> Option<f64> {
@@ -206,10 +205,16 @@ impl Distribution for Mixture {
 
     fn cdf_slopes(&self, x: f64) -> Option<CdfSlopes> {
         let all = self.log_density(&Datum::Num(x));
-        let below = libm::exp(self.tails(x)?.below);
+        let whole = self.tails(x)?;
+        // Differences of the smaller tail, relative to the density.
+        let lower = whole.below <= whole.above;
+        let part = |t: Tails| match lower {
+            true => libm::exp(t.below - all),
+            false => -libm::exp(t.above - all),
+        };
         let (mut by_weight, mut rest) = (CdfSlopes::new(), CdfSlopes::new());
         for (share, c) in self.log_shares.iter().zip(&self.components) {
-            by_weight.push((libm::exp(c.tails(x)?.below) - below) / self.total * libm::exp(-all));
+            by_weight.push((part(c.tails(x)?) - part(whole)) / self.total);
             let own = libm::exp(share + c.log_density_num(x) - all);
             match c.cdf_slopes(x).filter(|_| own > 0.0) {
                 Some(cdf_slopes) => rest.extend(cdf_slopes.iter().map(|s| own * s)),
@@ -219,6 +224,11 @@ impl Distribution for Mixture {
         }
         by_weight.extend(rest);
         Some(by_weight)
+    }
+
+    /// That of the components which the others vanish beside.
+    fn pole(&self) -> Option<f64> {
+        self.components.iter().filter_map(Dist::pole).min_by(f64::total_cmp)
     }
 
     fn has_moving_support(&self) -> bool {

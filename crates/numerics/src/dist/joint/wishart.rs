@@ -67,9 +67,7 @@ impl Wishart {
             let sum: f64 = columns.iter().enumerate().map(|(j, c)| c[i] * a[k * n + j]).sum();
             -sum - if i == k { (i + 1) as f64 / self.scale.diagonal(i) } else { 0.0 }
         };
-        let by: Vec<f64> =
-            (0..n).flat_map(|i| (0..=i).map(move |k| (i, k))).map(|(i, k)| cell(i, k)).collect();
-        by.iter().all(|g| g.is_finite()).then_some(by)
+        Some((0..n).flat_map(|i| (0..=i).map(move |k| (i, k))).map(|(i, k)| cell(i, k)).collect())
     }
 
     /// Returns the derivatives of the log density with respect to column `j` of A = S^-1
@@ -164,7 +162,6 @@ impl Distribution for Wishart {
             }
             by_df += libm::log(d) - 0.5 * LN_2 - 0.5 * digamma(0.5 * (self.df - j as f64));
         }
-        let finite = by_x.iter().all(|g| g.is_finite());
-        finite.then(|| Gradient { x: by_x, params: vec![by_df] })
+        Some(Gradient { x: by_x, params: vec![by_df] })
     }
 }

@@ -11,6 +11,8 @@ fn many_at_once_are_as_one_at_a_time() {
         ("gamma", 2, [0.3, 1.2, 2.0]),
         ("poisson", 1, [0.0, 2.0, 3.0]),
         ("flip", 1, [0.0, 1.0, 1.0]),
+        ("flip_logit", 1, [0.0, 1.0, 1.0]),
+        ("poisson_log", 1, [0.0, 2.0, 3.0]),
     ] {
         // Bit k of `shape` says whether parameter k has a value for each element.
         for shape in 0..1 << width {
@@ -49,8 +51,11 @@ fn many_at_once_are_as_one_at_a_time() {
                 b.vjp(&v, &mut by, x, &columns, n, 2.0);
                 let mut slopes = vec![0.0; v.len()];
                 for (i, s) in seen.iter().enumerate() {
-                    let datum =
-                        if family == "flip" { Datum::Bool(*s != 0.0) } else { Datum::Num(*s) };
+                    let datum = if family.starts_with("flip") {
+                        Datum::Bool(*s != 0.0)
+                    } else {
+                        Datum::Num(*s)
+                    };
                     let d = one(&v, i);
                     expected.add(d.log_density(&datum));
                     let g = d.gradient(&datum).unwrap();
@@ -65,7 +70,11 @@ fn many_at_once_are_as_one_at_a_time() {
                 assert!(off < 1e-12, "{family} {shape}: {by:?}, one at a time {slopes:?}");
             }
             // Parameters outside the domain.
-            let v = fill(-9.0);
+            let v = fill(if family.ends_with("_logit") || family.ends_with("_log") {
+                INF
+            } else {
+                -9.0
+            });
             assert!(!b.score(&v, x, &columns, n, &mut ExactSum::default()), "{family}");
         }
     }

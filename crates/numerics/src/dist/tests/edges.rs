@@ -307,6 +307,44 @@ fn bad_parameters_are_errors_that_say_so() {
     assert!(try_make("dirichlet", &[]).is_err() && try_make("categorical", &[]).is_err());
 }
 
+/// Where the probabilities themselves round to 0 and 1. The values are from mpmath.
+#[test]
+fn log_odds_keep_their_digits() {
+    let near = |found: f64, wanted: f64| {
+        assert!((found - wanted).abs() <= 4e-15 * wanted.abs(), "{found} is not {wanted}");
+    };
+    let flip = |l: f64, x: bool| make("flip_logit", &[l]).log_density_bool(x);
+    assert_eq!((flip(40.0, false), flip(-800.0, true)), (-40.0, -800.0));
+    near(flip(40.0, true), -libm::exp(-40.0));
+    near(flip(0.5, true), -0.474_076_984_180_107_67);
+    let at = |family: &str, p: &[f64], k: f64| make(family, p).log_density_num(k);
+    near(at("binomial_logit", &[7.0, 40.0], 5.0), 21f64.ln() - 80.0);
+    near(at("binomial_logit", &[7.0, -800.0], 7.0), -5600.0);
+    near(at("binomial_logit", &[7.0, -800.0], 2.0), 21f64.ln() - 1600.0);
+    near(at("poisson_log", &[-800.0], 3.0), -2400.0 - 6f64.ln());
+    near(at("poisson_log", &[-800.0], 0.0), -libm::exp(-800.0));
+    near(at("categorical_logits", &[0.0, 1000.0, -INF], 0.0), -1000.0);
+    assert_eq!(at("categorical_logits", &[0.0, 1000.0, -INF], 2.0), NEVER);
+    assert_eq!(at("categorical_logits", &[0.0, 1000.0], 0.5), NEVER);
+    // In the ordinary range they are the other parametrisations.
+    for l in [-3.0, -0.4, 0.0, 1.7] {
+        let p = crate::num::expit(l);
+        for k in [0.0, 4.0, 9.0] {
+            let one = at("binomial", &[9.0, p], k);
+            assert!((at("binomial_logit", &[9.0, l], k) - one).abs() < 1e-13 * one.abs());
+            let one = at("poisson", &[libm::exp(l)], k);
+            assert!((at("poisson_log", &[l], k) - one).abs() < 1e-13 * one.abs().max(1.0));
+        }
+    }
+    let message = |family: &str, p: &[f64]| try_make(family, p).unwrap_err().to_string();
+    assert_eq!(message("poisson_log", &[37.0]), "poisson: log must be at most log(2^53), got 37");
+    assert_eq!(message("flip_logit", &[INF]), "flip: logit must be finite, got inf");
+    assert_eq!(
+        message("categorical_logits", &[-INF]),
+        "categorical: logits must have a finite log_sum_exp, got -inf"
+    );
+}
+
 #[test]
 fn finite_supports_list_their_values() {
     let numbers = |d: &Dist| {

@@ -8,6 +8,7 @@ mod gradients;
 mod matrices;
 mod mixtures;
 mod normalisation;
+mod poles;
 mod samplers;
 mod transforms;
 mod truncated;
@@ -39,6 +40,7 @@ fn try_make(family: &str, p: &[f64]) -> Result<Dist, ParamError> {
         "multinomial" => Multinomial::new(p[0], &p[1..])?.into(),
         "lkj" => Lkj::new(p[0], p[1])?.into(),
         "categorical" => Categorical::new(p)?.into(),
+        "categorical_logits" => CategoricalLogits::new(p)?.into(),
         "dirichlet" => Dirichlet::new(p)?.into(),
         _ => {
             let family = FAMILIES.iter().find(|f| f.name == family).unwrap();

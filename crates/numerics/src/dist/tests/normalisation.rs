@@ -66,6 +66,10 @@ fn probabilities_sum_to_one() {
         ("geometric", &[0.2], 200),
         ("geometric", &[1.0], 3),
         ("categorical", &[3.0, 0.0, 1e-3, 5.0], 3),
+        ("binomial_logit", &[17.0, 0.4], 17),
+        ("binomial_logit", &[17.0, -800.0], 17),
+        ("poisson_log", &[5.0], 1000),
+        ("categorical_logits", &[3.0, -INF, 700.0, 701.0], 3),
     ];
     for (family, p, last) in cases {
         let d = make(family, p);

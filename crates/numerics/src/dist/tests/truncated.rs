@@ -29,6 +29,9 @@ const DISCRETE: &[(&str, &[f64])] = &[
     ("geometric", &[0.3]),
     ("uniform_discrete", &[-2.0, 9.0]),
     ("categorical", &[0.3, 0.2, 0.1, 0.9, 0.4]),
+    ("poisson_log", &[1.2]),
+    ("binomial_logit", &[12.0, -0.6]),
+    ("categorical_logits", &[-0.3, 0.2, 1.1, -0.9, 0.4]),
 ];
 
 fn cut(family: &str, p: &[f64], lo: f64, hi: f64) -> Dist {
@@ -158,7 +161,7 @@ fn slopes_are_those_of_differences() {
             let x = if discrete { 2.0 } else { 0.5 * (lo.max(0.0) + hi.min(1.0)) };
             let d = cut(family, p, *lo, *hi);
             let g = d.gradient(&Datum::Num(x)).unwrap_or_else(|| panic!("{family} {lo} {hi}"));
-            let whole = !matches!(*family, "binomial" | "uniform_discrete");
+            let whole = !matches!(*family, "binomial" | "binomial_logit" | "uniform_discrete");
             for i in 0..p.len() {
                 if !whole && (i == 0 || *family == "uniform_discrete") {
                     continue;
@@ -342,4 +345,94 @@ fn unlike_priors_in_order() {
         Ordered::of(vec![make("normal", &[50.0, 1.0]), make("normal", &[0.0, 1.0])]).unwrap();
     assert!(apart.support().contains(&apart.sample(&mut rng)));
     assert!(Ordered::of(vec![make("poisson", &[1.0])]).is_err());
+}
+
+/// Calls `check` with every family truncated in all these ways, with all parameters from a
+/// list, and the logarithm of the interval's probability.
+fn each_cut(values: &[f64], check: impl Fn(&str, &[f64], (f64, f64), &Dist)) {
+    let bounds = [
+        (5.0, INF),
+        (0.95, INF),
+        (0.95, 0.99),
+        (5.0, 6.0),
+        (-INF, 0.5),
+        (-3.0, -2.0),
+        (-INF, -5.0),
+    ];
+    let mut families: Vec<(&str, usize)> = CONTINUOUS.iter().map(|(f, p)| (*f, p.len())).collect();
+    families.dedup();
+    for (family, n) in families {
+        for code in 0..values.len().pow(n as u32) {
+            let digit = |i: usize| code / values.len().pow(i as u32) % values.len();
+            let p: Vec<f64> = (0..n).map(|i| values[digit(i)]).collect();
+            let Ok(base) = try_make(family, &p) else { continue };
+            for (lo, hi) in bounds {
+                if let Ok(d) = truncated(&base, lo, hi) {
+                    check(family, &p, (lo, hi), &d);
+                }
+            }
+        }
+    }
+}
+
+const POINTS: [f64; 8] = [0.3, 0.96, 0.99, 5.01, 5.9, 40.0, -2.5, -40.0];
+
+/// A leapfrog step may lead to any parameters.
+#[test]
+fn where_a_density_is_finite_there_are_derivatives() {
+    let values =
+        [1e-300, 1e-150, 1e-40, 1e-8, 1e-3, 0.1, 1.0, 7.0, 100.0, 1e4, 1e7, 1e40, 1e150, 1e300];
+    each_cut(&values, |family, p, bounds, d| {
+        for x in POINTS {
+            let score = d.log_density_num(x);
+            // More than the largest density of a distribution that double parameters give.
+            assert!(score < 1e3, "{family}{p:?} {bounds:?} at {x}: {score}");
+            let g = d.gradient(&Datum::Num(x));
+            assert!(g.is_some() || score == -INF, "{family}{p:?} {bounds:?} at {x}: {score}");
+        }
+    });
+}
+
+#[test]
+fn derivatives_far_from_the_mass_agree_with_differences() {
+    each_cut(&[0.05, 0.3, 1.0, 7.0, 40.0, 200.0], |family, p, (lo, hi), d| {
+        for x in POINTS.into_iter().filter(|x| d.log_density_num(*x).is_finite()) {
+            let g = d.gradient(&Datum::Num(x)).unwrap();
+            for (i, found) in g.params.iter().take(p.len()).enumerate() {
+                let h = 2e-5 * p[i];
+                let at = |by: f64| {
+                    let mut q = p.to_vec();
+                    q[i] += by * h;
+                    let d = truncated(&make(family, &q), lo, hi);
+                    d.map_or(f64::NAN, |d| d.log_density_num(x))
+                };
+                let wanted = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * h);
+                if !wanted.is_finite() {
+                    continue;
+                }
+                // What rounding of the two terms of the density leaves of a difference.
+                let term = make(family, p).log_density_num(x).abs().max(1.0);
+                let noise = 1e-14 * term / h;
+                assert!(
+                    (found - wanted).abs() <= 1e-5 * wanted.abs() + 10.0 * noise + 1e-5,
+                    "{family}{p:?} {lo} {hi} at {x}, {i}: {found} is not {wanted}"
+                );
+            }
+        }
+    });
+}
+
+#[test]
+fn weights_of_a_mixture_count_in_its_far_tail() {
+    // Above 60 only the second component is left: P(X > 60) = w exp(-30).
+    let at = |w: f64| {
+        let parts = vec![make("normal", &[0.0, 1.0]), make("exponential", &[0.5])];
+        let mixed = Dist::from(Mixture::new(&[1.0, w], parts).unwrap());
+        truncated(&mixed, 60.0, INF).unwrap()
+    };
+    let g = at(2.0).gradient(&Datum::Num(61.0)).unwrap();
+    assert!(g.params.iter().all(|p| p.is_finite()), "{g:?}");
+    // The same density whatever the weights.
+    assert!(g.params[0].abs() < 1e-9 && g.params[1].abs() < 1e-9, "{g:?}");
+    close(at(2.0).log_density_num(61.0), 0.5f64.ln() - 0.5, 1e-12);
 }

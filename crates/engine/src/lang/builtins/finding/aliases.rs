@@ -1,4 +1,4 @@
-//! Names of built-ins in other systems (Stan, PyMC, BUGS, numpy), for the search of the
+//! Names of built-ins in other systems (Stan, PyMC, WebPPL, BUGS, numpy), for the search of the
 //! reference.
 
 /// Built-ins with their other names. Underscores and dots separate words, as in queries.
@@ -21,11 +21,17 @@ pub(in crate::lang::builtins) const ALIASES: &[(&str, &str)] = &[
     ("mv_normal", "multi_normal multi_normal_cholesky mvnormal multivariate"),
     ("lkj", "lkj_corr_cholesky correlation"),
     ("neg_binomial", "negative binomial nb overdispersed"),
-    ("flip", "bernoulli coin"),
+    ("flip", "bernoulli coin bernoulli_logit bernoulli_lpmf logit_p invlogit logistic regression"),
+    ("binomial", "binomial_logit logit_p trials"),
+    ("categorical", "categorical_logit softmax logit_p discrete"),
+    ("poisson", "poisson_log log_rate counts"),
     ("matmul", "matrix multiply multiplication times mm"),
     ("fold", "scan recurrence recursion accumulate reduce cumulative time series autoregressive"),
     ("log_sum_exp", "logsumexp mixture softmax"),
-    ("expit", "inv_logit sigmoid logistic"),
+    ("expit", "inv_logit invlogit sigmoid logistic"),
+    ("normal_cdf", "phi std_normal_cdf pnorm norm cdf probit"),
+    ("log_normal_cdf", "normal_lcdf std_normal_lcdf log_phi logcdf log_ndtr lcdf probit"),
+    ("log1m_exp", "log1mexp log1m"),
     ("iid", "independent plate shape replicate"),
     ("von_mises", "circular angle"),
     (
