@@ -245,12 +245,8 @@ fn choices_that_never_move_although_they_could() {
          infer { repeat 300 { gibbs(each($finite)); } }";
     let options = RunOptions { seed: 1, sites: true, ..RunOptions::default() };
     let posterior = Model::from_text(text).unwrap().run(&options, 1, 1).unwrap();
-    let stuck: Vec<&str> = posterior.chains[0]
-        .sites
-        .iter()
-        .filter(|s| s.is_stuck())
-        .map(|s| &*s.address)
-        .collect();
+    let stuck: Vec<&str> =
+        posterior.chains[0].sites.iter().filter(|s| s.is_stuck()).map(|s| &*s.address).collect();
     assert_eq!(stuck, ["@a"]);
 }
 

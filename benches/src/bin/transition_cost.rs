@@ -61,7 +61,7 @@ fn run(
     let (mut moved, mut left) = (0, 0);
     for step in steps {
         if left == 0 {
-            left = kernel.sweep(trace, None).unwrap_or(1);
+            kernel.sweep(trace, None);
         }
         let at = StepContext::new(1, 0, step);
         let outcome = kernel.step(trace, &at).map_err(|e| e.to_string())?;

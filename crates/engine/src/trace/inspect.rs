@@ -270,8 +270,7 @@ impl Trace {
             };
             let frame = self.graph.nodes[n as usize].frame;
             let Value::Likelihood(l) = self.graph.value(&self.code, frame, *o) else { return None };
-            let observed =
-                self.graph.observed_value(&self.code, n, *value, &mut node::Deps::new());
+            let observed = self.graph.observed_value(&self.code, n, *value, &mut node::Deps::new());
             Some((n, &**l, observed))
         })
     }
