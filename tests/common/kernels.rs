@@ -53,7 +53,6 @@ pub mod exact {
         "hmc(@m, steps = 5, marginal = @z)",
         "mala(@m, marginal = @z)",
         "nuts(@m, marginal = @z[0] + @z[1]); gibbs(one(@z));",
-        "nuts(@m); exact(@z);",
     ];
     pub const BETA_BINOMIAL: &[&str] = &["mh(@p)", "drift(@p)"];
     /// Evidence and changing structure by particles; likelihood-free inference.

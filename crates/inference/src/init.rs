@@ -194,8 +194,9 @@ pub(crate) fn starts_from(
         Some(Ok(mut t)) => {
             // Finite choices can be drawn given the data, however unlikely that is by chance.
             let at = StepContext::new(seed, chain, u64::MAX);
-            let drawn = Exact::new(Selector::Kind(ChoiceKind::Finite)).step(&mut t, &at);
-            match drawn.is_ok() && t.log_joint() > f64::NEG_INFINITY {
+            let mut exact = Exact::new(Selector::Kind(ChoiceKind::Finite));
+            let drawn = forced.is_empty() && exact.step(&mut t, &at).is_ok();
+            match drawn && t.log_joint() > f64::NEG_INFINITY {
                 true => Ok(vec![t]),
                 false => Err(StartError::Impossible(explain(&t))),
             }

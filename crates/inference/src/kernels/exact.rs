@@ -69,7 +69,11 @@ impl Exact {
 
     /// Makes the tables for the present state, unless those of the last step still hold;
     /// false if the program fails at some values of the choices.
-    fn tabulate(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<bool> {
+    fn tabulate(
+        &mut self,
+        trace: &mut Trace,
+        at: &StepContext,
+    ) -> TraceResult<Result<bool, Box<RunError>>> {
         let selection = self.scope.selection(trace);
         let others = others(trace, selection);
         let observed = trace.replacements();
@@ -80,30 +84,42 @@ impl Exact {
                 && l.others == others
         };
         if self.last.as_ref().is_some_and(holds) {
-            return Ok(true);
+            return Ok(Ok(true));
         }
         self.last = None;
         let (identity, observed) = (Arc::clone(trace.identity()), Arc::clone(observed));
         let tables = match trace.tabulate(selection, at.power, at.draws(0))? {
             Tabulation::Tables(tables) => tables,
-            Tabulation::Fails => return Ok(false),
-            Tabulation::Refused(e) => return Err(e),
+            Tabulation::Fails => return Ok(Ok(false)),
+            Tabulation::Refused(e) => return Ok(Err(e)),
         };
-        let elimination = Elimination::new(&tables.counts(), &tables.factors, LARGEST)
-            .map_err(|e| too_large(trace, selection, e))?;
+        let made = Elimination::new(&tables.counts(), &tables.factors, LARGEST);
+        let elimination = match made {
+            Ok(elimination) => elimination,
+            Err(e) => return Ok(Err(too_large(trace, selection, e))),
+        };
         self.last =
             Some(Last { trace: identity, observed, power: at.power, others, tables, elimination });
-        Ok(true)
+        Ok(Ok(true))
     }
 
-    /// Draws the choices.
+    /// Draws the choices; or returns why they have no tables, or too large ones.
     ///
     /// # Errors
-    /// If they have no tables, or one would be too large.
-    pub(super) fn draw(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
-        if !self.tabulate(trace, at)? {
-            return Ok(Outcome::failed());
+    /// If the program fails in a way that does not depend on their values.
+    pub(super) fn draw(
+        &mut self,
+        trace: &mut Trace,
+        at: &StepContext,
+    ) -> TraceResult<Result<Outcome, Box<RunError>>> {
+        match self.tabulate(trace, at)? {
+            Ok(true) => self.draw_from_tables(trace, at).map(Ok),
+            Ok(false) => Ok(Ok(Outcome::failed())),
+            Err(refused) => Ok(Err(refused)),
         }
+    }
+
+    fn draw_from_tables(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let selection = self.scope.selection(trace);
         let Some(Last { others, tables, elimination, .. }) = &self.last else {
             return Ok(Outcome::failed());
@@ -160,6 +176,6 @@ impl Kernel for Exact {
         if trace.targets(selection).is_empty() {
             return Ok(Outcome::default());
         }
-        self.draw(trace, at)
+        self.draw(trace, at)?
     }
 }

@@ -51,6 +51,8 @@ pub(super) struct Visited<'a> {
     pub indices: &'a [usize],
     /// All choices of the trace; none if what is read is the same as in the state before.
     pub choices: &'a [NodeId],
+    /// The choices that observations and factors depend on; none like `choices`.
+    pub asked: &'a [NodeId],
     /// Through which of their values the choices determine each node, if that was asked for.
     pub given: &'a FxHashMap<NodeId, Option<Given>>,
 }
@@ -105,7 +107,8 @@ impl Trace {
                 self.go_to(sites, &indices, draws)?;
                 if known && sites.same && state > 0 && !with_given {
                     let (first, indices) = (false, &indices[..]);
-                    at(self, sites, Visited { first, indices, choices: &[], given: &nothing })?;
+                    let (choices, asked) = (&[][..], &[][..]);
+                    at(self, sites, Visited { first, indices, choices, asked, given: &nothing })?;
                     continue;
                 }
                 let mut partition = Partition::default();
@@ -132,8 +135,10 @@ impl Trace {
                     continue;
                 }
                 let given = if with_given { reader.given(&indices) } else { FxHashMap::default() };
-                let (first, indices, choices) = (state == 0, &indices[..], &choices[..]);
-                at(self, sites, Visited { first, indices, choices, given: &given })?;
+                let asked = std::mem::take(&mut reader.found.asked);
+                let (first, indices) = (state == 0, &indices[..]);
+                let (choices, asked) = (&choices[..], &asked[..]);
+                at(self, sites, Visited { first, indices, choices, asked, given: &given })?;
             }
             if known {
                 return Ok(());
@@ -150,10 +155,10 @@ impl Trace {
         let weight = self.propose(&changes, draws).map_err(|_| Halt::Fails)?;
         let same =
             |(t, s): (&Target, &Support)| self.dist(*t).is_some_and(|d| d.stored_support() == *s);
-        let halt = if weight.appeared + weight.vanished > 0 {
+        let halt = if self.detaches_held() {
+            Some(Halt::Cannot("other choices are created or removed with it"))
+        } else if weight.appeared + weight.vanished > 0 {
             Some(Halt::Structure(changes))
-        } else if self.detaches_held() {
-            Some(Halt::Cannot("which choices exist depends on it"))
         } else if !sites.targets.iter().zip(&sites.supports).all(same) {
             Some(Halt::Cannot("its possible values depend on other choices"))
         } else {

@@ -91,6 +91,7 @@ impl Trace {
             };
             let mut tables = Tables::default();
             let visit = |trace: &mut Trace, sites: &Sites, state: Visited| {
+                trace.asks_for_all(sites, &state)?;
                 tables.enter(trace, sites, state, power)
             };
             let most = (MOST_WORK / self.graph.nodes.len().max(1)).clamp(1, MOST);
@@ -100,10 +101,15 @@ impl Trace {
                 Err(Halt::Cannot(why)) => break refused(self, why),
                 // Selected choices that appear are among those of the next round.
                 Err(Halt::Structure(changes)) => {
-                    let appeared = self.propose(&changes, draws)?.appeared;
+                    let why = "other choices are created or removed with it";
+                    let update = self.propose(&changes, draws)?;
+                    if update.appeared == 0 || update.vanished > 0 {
+                        self.rollback();
+                        break refused(self, why);
+                    }
                     self.commit();
-                    if appeared == 0 || self.beside(selection) != others {
-                        break refused(self, "other choices are created or removed with it");
+                    if self.beside(selection) != others {
+                        break refused(self, why);
                     }
                 }
             }
@@ -114,6 +120,17 @@ impl Trace {
         }
         self.restore(&before, draws)?;
         Ok(done)
+    }
+
+    /// Checks that observations and factors depend on all choices that are not of `sites`:
+    /// one that they do not would vanish.
+    fn asks_for_all(&self, sites: &Sites, state: &Visited) -> Result<(), Halt> {
+        let own = sites.targets.iter().map(|t| t.node);
+        let known: FxHashSet<NodeId> = state.asked.iter().copied().chain(own).collect();
+        match state.choices.iter().all(|n| known.contains(n)) {
+            true => Ok(()),
+            false => Err(Halt::Cannot("other choices are created or removed with it")),
+        }
     }
 
     /// The choices that are not selected.

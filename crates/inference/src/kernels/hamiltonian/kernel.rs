@@ -181,8 +181,11 @@ impl<T: Trajectory + Send> Kernel for Hamiltonian<T> {
         if trace.targets(selections.0).is_empty() {
             return self.go(trace, at, None);
         }
-        if trace.targets(selections.1).is_empty() {
-            return self.exact.draw(trace, at);
+        // Where sums are not possible, choices to move may exist at other values.
+        if trace.targets(selections.1).is_empty()
+            && let Ok(outcome) = self.exact.draw(trace, at)?
+        {
+            return Ok(outcome);
         }
         if let Some(outcome) = self.go_summed(trace, at, selections)? {
             return Ok(outcome);
