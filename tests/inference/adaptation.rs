@@ -40,8 +40,7 @@ enum Of {
     /// (`hamiltonian/memory.rs`), which affects how a density is computed, not which
     /// density.
     Trajectory,
-    /// `optimize`: nothing, since its state is only how often tapes are recorded; `exact`,
-    /// which has none.
+    /// `optimize`: nothing, since its state is only how often tapes are recorded.
     Nothing,
     /// `temper`: all except the replicas, which are states of the larger chain, and the
     /// count of steps, which determines the pairs whose turn it is.
@@ -63,7 +62,7 @@ const CASES: &[(&str, &str, &str, Of)] = &[
     ("drift", MODEL, "drift(one(@**));", Of::All),
     ("drift", BRANCHES, "drift(@**); drift(each(@**)); mh(@c);", Of::All),
     ("gibbs", MODEL, "gibbs(each($finite));", Of::All),
-    ("exact", MODEL, "exact($finite);", Of::Nothing),
+    ("exact", MODEL, "exact($finite);", Of::All),
     ("elliptical", MODEL, "elliptical(@a); mh(@b);", Of::All),
     ("slice", MODEL, "slice(one($continuous));", Of::All),
     ("slice", BRANCHES, "slice($continuous, doubling = true); mh(@c);", Of::All),
