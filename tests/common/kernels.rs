@@ -88,6 +88,7 @@ pub mod exact {
         "gibbs(each(@s))",
         "mh(each(@s))",
         "drift(each(@s))",
+        "exact(@s)",
     ];
     pub const OPEN_UNIVERSE: &[&str] = &[
         "mh(one($discrete)); drift(one($continuous));",
@@ -120,6 +121,7 @@ pub mod balance {
         with_mh!("gibbs(@a)"),
         with_mh!("mh(@b)"),
         with_mh!("drift(@a, 1)"),
+        with_mh!("exact(@a)"),
     ];
     pub const SUPPORT: &[&str] = &[
         "mh(one(@**))",

@@ -59,10 +59,10 @@ fn choices_that_some_states_do_not_read() {
     let a = p / (p + q);
     assert_mean("a", &d["a"], a, 0.08);
     for (name, mean) in [("y", a * 0.8), ("y2", a * 0.8)] {
-        assert_mean(name, &d[name], mean, 0.1);
+        assert_mean(name, &d[name], mean, 0.2);
     }
     for (name, mean) in [("z", (1.0 - a) * 4.0 / 4.25), ("z2", (1.0 - a) * 4.0 / 4.25)] {
-        assert_mean(name, &d[name], mean, 0.2);
+        assert_mean(name, &d[name], mean, 0.3);
     }
 }
 
@@ -263,5 +263,5 @@ fn joint_walks_where_the_number_of_choices_varies() {
          infer { warmup 3000 { drift(@**); } repeat 20000 { drift(@**); collect jumps; } }";
     // A Poisson number of mean 2 that is odd.
     let d = run(text, 1, 4);
-    assert_mean("jumps", &d["jumps"], 2.0 / 2f64.tanh(), 0.2);
+    assert_mean("jumps", &d["jumps"], 2.0 / 2f64.tanh(), 0.25);
 }

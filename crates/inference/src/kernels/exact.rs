@@ -60,6 +60,14 @@ struct Last {
     elimination: Elimination,
 }
 
+/// Why there are no tables.
+pub(super) enum NoTables {
+    /// The program fails at some values of the choices.
+    Fails,
+    /// They cannot be tabulated, or a table would be too large.
+    Refused(Box<RunError>),
+}
+
 impl Exact {
     /// A kernel for these choices.
     pub fn new(choices: Selector) -> Self {
@@ -67,13 +75,12 @@ impl Exact {
         Exact { scope: Registered::new(scope), last: None, log_evidence: None }
     }
 
-    /// Makes the tables for the present state, unless those of the last step still hold;
-    /// false if the program fails at some values of the choices.
+    /// Makes the tables for the present state, unless those of the last step still hold.
     fn tabulate(
         &mut self,
         trace: &mut Trace,
         at: &StepContext,
-    ) -> TraceResult<Result<bool, Box<RunError>>> {
+    ) -> TraceResult<Result<(), NoTables>> {
         let selection = self.scope.selection(trace);
         let others = others(trace, selection);
         let observed = trace.replacements();
@@ -84,26 +91,26 @@ impl Exact {
                 && l.others == others
         };
         if self.last.as_ref().is_some_and(holds) {
-            return Ok(Ok(true));
+            return Ok(Ok(()));
         }
         self.last = None;
         let (identity, observed) = (Arc::clone(trace.identity()), Arc::clone(observed));
         let tables = match trace.tabulate(selection, at.power, at.draws(0))? {
             Tabulation::Tables(tables) => tables,
-            Tabulation::Fails => return Ok(Ok(false)),
-            Tabulation::Refused(e) => return Ok(Err(e)),
+            Tabulation::Fails => return Ok(Err(NoTables::Fails)),
+            Tabulation::Refused(e) => return Ok(Err(NoTables::Refused(e))),
         };
         let made = Elimination::new(&tables.counts(), &tables.factors, LARGEST);
         let elimination = match made {
             Ok(elimination) => elimination,
-            Err(e) => return Ok(Err(too_large(trace, selection, e))),
+            Err(e) => return Ok(Err(NoTables::Refused(too_large(trace, selection, e)))),
         };
         self.last =
             Some(Last { trace: identity, observed, power: at.power, others, tables, elimination });
-        Ok(Ok(true))
+        Ok(Ok(()))
     }
 
-    /// Draws the choices; or returns why they have no tables, or too large ones.
+    /// Draws the choices; or returns why they have no tables.
     ///
     /// # Errors
     /// If the program fails in a way that does not depend on their values.
@@ -111,11 +118,10 @@ impl Exact {
         &mut self,
         trace: &mut Trace,
         at: &StepContext,
-    ) -> TraceResult<Result<Outcome, Box<RunError>>> {
+    ) -> TraceResult<Result<Outcome, NoTables>> {
         match self.tabulate(trace, at)? {
-            Ok(true) => self.draw_from_tables(trace, at).map(Ok),
-            Ok(false) => Ok(Ok(Outcome::failed())),
-            Err(refused) => Ok(Err(refused)),
+            Ok(()) => self.draw_from_tables(trace, at).map(Ok),
+            Err(none) => Ok(Err(none)),
         }
     }
 
@@ -176,6 +182,10 @@ impl Kernel for Exact {
         if trace.targets(selection).is_empty() {
             return Ok(Outcome::default());
         }
-        self.draw(trace, at)?
+        match self.draw(trace, at)? {
+            Ok(outcome) => Ok(outcome),
+            Err(NoTables::Fails) => Ok(Outcome::failed()),
+            Err(NoTables::Refused(e)) => Err(e),
+        }
     }
 }

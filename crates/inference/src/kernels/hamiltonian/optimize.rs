@@ -138,7 +138,7 @@ pub(super) fn ascend(
 }
 
 /// The most steps of a short ascent.
-const FEW: u32 = 10;
+const FEW: u32 = 50;
 
 /// Climbs a few steps with all continuous choices, while each gains much more than the
 /// density varies within the typical set; a mode may be far from that.
