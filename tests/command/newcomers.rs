@@ -225,7 +225,7 @@ fn what_does_not_move_has_no_r_hat_and_a_reason() {
     let f = Folder::new("still");
     f.write(
         "x.pcad",
-        "assume x ~ normal(0, 1); assume c = 3; infer { repeat 100 { collect x, c; } }",
+        "assume x ~ normal(0, 1); assume c = 3; observe normal(x, 1) = 1; infer { repeat 100 { collect x, c; } }",
     );
     f.succeeds(&["run", "x.pcad", "--quiet", "--out", "out"]);
     let (summary, run) = (json(&f, "out/summary.json"), json(&f, "out/run.json"));
@@ -468,8 +468,8 @@ fn chains_that_cannot_start_are_told() {
     let f = Folder::new("cannot-start");
     f.write(
         "rare.pcad",
-        "assume x ~ flip(0.001); assume y ~ normal(0, 1); observe normal(y, 1) = 1;
-         observe flip(if x { 1 } else { 0 }) = true as seen;
+        "assume x ~ normal(0, 1); assume y ~ normal(0, 1); observe normal(y, 1) = 1;
+         observe flip(if x > 3.09 { 1 } else { 0 }) = true as seen;
          infer { repeat 100 { drift(@y); collect y; } }",
     );
     let done = f.succeeds(&["run", "rare.pcad", "--chains", "8", "--seed", "1", "--out", "out"]);

@@ -124,11 +124,13 @@ pub trait Kernel: Send {
     }
 
     /// The number of steps of the sweep that remain in the present state.
+    #[doc(hidden)]
     fn remaining(&mut self, trace: &mut Trace) -> usize {
         self.scope().map_or(0, |s| s.remaining(trace))
     }
 
     /// The address hash of the choice that the sweep has visited last.
+    #[doc(hidden)]
     fn visited(&mut self, trace: &Trace) -> Option<u64> {
         self.scope()?.visited(trace)
     }

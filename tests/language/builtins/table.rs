@@ -36,7 +36,7 @@ fn mistakes_in_arguments_are_explained() {
         "`range` has no argument `stepp`; did you mean `step`?"
     );
     assert_eq!(wrong("clamp", &[Some("q")]), "`clamp` has no argument `q`; it takes x, lo, hi");
-    assert_eq!(wrong("prior", &[Some("q")]), "`prior` has no argument `q`; it takes none");
+    assert_eq!(wrong("steps", &[Some("q")]), "`steps` has no argument `q`; it takes none");
     assert_eq!(wrong("clamp", &[None, Some("x"), None]), "`clamp` got its argument `x` twice");
     assert_eq!(wrong("min", &[]), "`min` needs its argument `x`: min(x, …)");
 }
