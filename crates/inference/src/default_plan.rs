@@ -1,7 +1,7 @@
 //! The plan of a program without an `infer` block. It depends on the program's choices and
 //! on how its density behaves in several draws, and is printed so that it can be copied.
 
-use super::init::{attempts, free_density};
+use super::init::{attempts, free_density, spread};
 use super::kernels::approach;
 use crate::StepContext;
 use pcadlang_engine::lang::address::Address;
@@ -28,9 +28,9 @@ const LARGEST: usize = 1 << 20;
 /// have choices that the first one lacks.
 const DRAWS: u64 = 10;
 /// The most draws from the prior until one succeeds.
-const ATTEMPTS: u64 = 1000;
+const ATTEMPTS: u64 = 300;
 /// The number of uniform starts that are compared with draws from the prior.
-const UNIFORM: u64 = 3;
+const UNIFORM: usize = 3;
 /// Draws from the prior lie far below if it is by more nats than this, and by more than this
 /// many per coordinate.
 const FAR: (f64, f64) = (100.0, 20.0);
@@ -58,11 +58,13 @@ pub fn default_plan(code: &Arc<Code>, limits: &Limits) -> TraceResult<String> {
         Trace::started(Arc::clone(code), [], spread, draws, limits.clone()).map(|(t, _)| t)
     };
     let mut draws: Vec<Trace> = (0..DRAWS).filter_map(|i| started(None, i).ok()).collect();
-    let uniform = |i| started(Some(2.0), i);
+    let uniform = |i| started(Some(spread(i)), i);
+    let mut far = false;
     if draws.is_empty() {
         // Draws may fail, e.g. because a standard deviation is negative or overflows; the
         // plan is then made from the first draw that succeeds.
         let drawn = attempts(ATTEMPTS, |i| started(None, i));
+        far = drawn.is_err();
         draws.push(drawn.or_else(|e| attempts(ATTEMPTS, uniform).map_err(|_| e))?);
     }
     let mut program = Program { draws };
@@ -78,8 +80,7 @@ pub fn default_plan(code: &Arc<Code>, limits: &Limits) -> TraceResult<String> {
     // Exact draws of all choices do not depend on where they begin.
     let independent = joint.is_some() && finite == continuous + discrete;
     let mut lines = Vec::new();
-    let far = continuous > 0 && program.lies_far(uniform);
-    if far {
+    if far || continuous > 0 && program.lies_far(uniform) {
         lines.push("  // Draws from the prior are impossible, or far from the data.".to_owned());
         lines.push("  init(unconstrained());".to_owned());
     } else if !independent {
@@ -231,8 +232,10 @@ impl Program {
         let by_density = |a: &&Trace, b: &&Trace| free_density(a).total_cmp(&free_density(b));
         let best = self.draws.iter().max_by(by_density).cloned();
         let prior = best.and_then(reached).map_or(none, |there| higher(none, there));
-        let all = (0..UNIFORM).filter_map(|i| reached(uniform(i).ok()?));
-        let near = all.fold(none, higher);
+        // The first few that are possible.
+        let possible = |t: &Trace| t.log_joint() > f64::NEG_INFINITY;
+        let all = (0..ATTEMPTS).filter_map(|i| uniform(i).ok().filter(possible)).take(UNIFORM);
+        let near = all.filter_map(reached).fold(none, higher);
         near.0 > f64::NEG_INFINITY && near.0 - prior.0 > FAR.0 + FAR.1 * near.1
     }
 

@@ -51,8 +51,11 @@ impl Default for Start {
     }
 }
 
-/// Half of the width of the interval of uniform starts, as in Stan.
-const SPREAD: f64 = 2.0;
+/// Half of the width of the interval of a uniform start: 2 as in Stan, and half of it after
+/// every ten attempts, as a point in the middle may be possible where none further out is.
+pub(crate) fn spread(attempt: u64) -> f64 {
+    2.0 * libm::pow(0.5, (attempt / 10) as f64)
+}
 
 /// How many draws from the prior may have zero probability before that is an error.
 pub(crate) const RETRIES: u64 = 1000;
@@ -225,7 +228,7 @@ impl Source<'_> {
     /// Makes a draw; `None` if the program is undefined where the kernel leads.
     fn draw(&mut self, attempt: u64) -> TraceResult<Option<Cow<'_, Trace>>> {
         let draws = Draws { key: self.key, step: attempt, substream: 0 };
-        let spread = (self.by == By::Density).then_some(SPREAD);
+        let spread = (self.by == By::Density).then(|| spread(attempt));
         let simulate = || self.forced.draw(self.code, (Vec::new(), spread), draws, self.limits);
         if self.by == By::Density {
             let mut trace = simulate()?;

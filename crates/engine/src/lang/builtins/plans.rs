@@ -73,7 +73,8 @@ pub(super) const TABLE: &[Row] = &[
         &[opt("n", Type::Int, "4", "The number of restarts.")],
         Type::Kernel,
         "A start for vague priors, as in Stan: continuous choices are uniform on (-2, 2) in the \
-         unconstrained space, others are drawn from the prior. A few steps of L-BFGS follow \
+         unconstrained space, others are drawn from the prior; where that is impossible the \
+         interval shrinks. A few steps of L-BFGS follow \
          while they gain much. One of `n` such states is taken, with probability proportional \
          to its density in that space.",
     ),
