@@ -338,6 +338,7 @@ mod tests {
             seed: 7,
             chain: 0,
             key,
+            by: By::Best,
             from,
             forced: &Forced::default(),
             limits: &limits,
