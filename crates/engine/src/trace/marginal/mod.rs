@@ -211,7 +211,7 @@ impl Trace {
             span: self.span(t.node),
             address: self.address(t),
             calls: Vec::new(),
-            hint: Some("select only finite discrete choices with `marginal`, and update the others with gibbs".into()),
+            hint: Some("select only finite discrete choices that do not decide which others exist, and leave the rest to gibbs or mh".into()),
         })
     }
 }
