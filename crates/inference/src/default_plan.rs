@@ -38,6 +38,8 @@ const FAR: (f64, f64) = (100.0, 20.0);
 const NAMED: usize = 4;
 /// The number of draws that are examined where that costs more.
 const FEW_DRAWS: usize = 3;
+/// The number of finite choices from which those of one draw are tabulated.
+const MANY: usize = 1000;
 /// The most choices that are examined one by one.
 const FEW: usize = 50;
 
@@ -76,9 +78,8 @@ pub fn default_plan(code: &Arc<Code>, limits: &Limits) -> TraceResult<String> {
     let finite = program.count(ChoiceKind::Finite);
     let rough = program.rough();
     let smooth = continuous > 0 && rough.as_ref().is_some_and(|r| r.len() < continuous);
-    let joint = if finite > 0 { program.exactly() } else { None };
     // Exact draws of all choices do not depend on where they begin.
-    let independent = joint.is_some() && finite == continuous + discrete;
+    let independent = finite == continuous + discrete && program.exactly().is_some();
     let mut lines = Vec::new();
     if far || continuous > 0 && program.lies_far(uniform) {
         lines.push("  // Draws from the prior are impossible, or far from the data.".to_owned());
@@ -121,7 +122,7 @@ pub fn default_plan(code: &Arc<Code>, limits: &Limits) -> TraceResult<String> {
         }
     }
     if left {
-        let exact = joint.is_some_and(|j| independent || j.pays());
+        let exact = independent || program.exactly().is_some_and(|j| j.pays());
         pass.push(if exact { "exact($finite);" } else { "gibbs(each($finite));" }.to_owned());
     }
     if discrete > finite {
@@ -261,9 +262,9 @@ impl Program {
     fn exactly(&mut self) -> Option<Joint> {
         let mut joint = Joint::default();
         // The states of one draw show all values, unless they depend on other choices.
-        let others = self.count(ChoiceKind::Continuous) + self.count(ChoiceKind::Discrete)
-            - self.count(ChoiceKind::Finite);
-        let draws = if others == 0 { 1 } else { FEW_DRAWS };
+        let finite = self.count(ChoiceKind::Finite);
+        let others = self.count(ChoiceKind::Continuous) + self.count(ChoiceKind::Discrete) - finite;
+        let draws = if others == 0 || finite > MANY { 1 } else { FEW_DRAWS };
         for trace in self.draws.iter_mut().take(draws) {
             let selection = trace.select(&Selector::Kind(ChoiceKind::Finite));
             let tables = match trace.tabulate(selection, 1.0, Draws::default()) {
