@@ -63,4 +63,4 @@ pub use plan::run_from;
 pub use run::{ChainError, ChainResult, Progress, RunOptions};
 pub use state::StateError;
 pub use state::{pack, unpack};
-pub use structure::stuck_structure;
+pub use structure::{stuck_structure, stuck_together};

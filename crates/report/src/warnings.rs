@@ -73,9 +73,9 @@ pub fn warnings(
             ));
         } else if k.accepted == 0 && k.possible > 0 {
             out.push(format!(
-                "{} accepted none of {} proposals, although other values are possible: the chains \
-                 may not be able to leave the modes in which they began; draw choices that depend \
-                 on each other together, with exact($finite) or block(…)",
+                "{} accepted none of {} proposals, although other values are possible: it only \
+                 costs time, or the chains cannot leave the modes in which they began; choices \
+                 that depend on each other are drawn together by exact($finite) or block(…)",
                 k.name, k.proposals
             ));
         } else if k.accepted == 0 {

@@ -24,7 +24,7 @@ use pcadlang_inference::RunOptions;
 use pcadlang_inference::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang_inference::{
     BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Progress, Trajectory,
-    stuck_structure,
+    stuck_structure, stuck_together,
 };
 use pcadlang_library::{Model, Started};
 use pcadlang_report::{
@@ -397,7 +397,7 @@ fn fill(
     let approximate = approximate(job, &chains);
     let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
     warnings.extend(chains.first().and_then(|c| structure_warning(&c.last, &sites)));
-    warnings.extend(stuck_warning(&sites));
+    warnings.extend(chains.first().and_then(|c| stuck_warning(&c.last, &sites)));
     let inputs = image.as_ref().map(|(name, _)| name.as_str()).zip(ready.image());
     let located = chains.first().map_or_else(Vec::new, |c| c.last.located());
     warnings.extend(seen::warnings(inputs, job.keypoints.as_deref(), &located));
@@ -457,16 +457,15 @@ fn structure_warning(state: &pcadlang_engine::trace::Trace, sites: &[SiteStats])
     ))
 }
 
-/// Warns of choices that never moved in any chain, although other values of them are possible.
-fn stuck_warning(sites: &[SiteStats]) -> Option<String> {
-    let stuck: Vec<&SiteStats> = sites.iter().filter(|s| s.is_stuck()).collect();
-    let more =
-        if stuck.len() > 1 { format!(" (and {} others)", stuck.len() - 1) } else { String::new() };
+/// Warns of choices that never moved in any chain and may hold each other in place.
+fn stuck_warning(state: &pcadlang_engine::trace::Trace, sites: &[SiteStats]) -> Option<String> {
+    let stuck = stuck_together(state, sites);
+    let others = stuck.len().checked_sub(1)?;
     Some(format!(
-        "{}{more} never moved in any chain, although other values are possible: the chains may not \
-         be able to leave the modes in which they began; draw choices that depend on each other \
-         together, with exact($finite) or block(…)",
-        stuck.first()?.address
+        "{} and {others} others that it depends on never moved in any chain, although other values \
+         are possible: the chains may not be able to leave the modes in which they began; draw \
+         such choices together, with exact($finite) or block(…)",
+        stuck.first()?
     ))
 }
 
