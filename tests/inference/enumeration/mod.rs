@@ -416,7 +416,7 @@ fn many_random_programs_keep_their_posterior() {
 #[ignore = "minutes"]
 fn many_wide_programs_keep_their_posterior() {
     let first = number("FIRST", 1000);
-    judge(&tally(first..first + number("ENUMERATED", 3000), Made::Wide));
+    judge(&tally(first..first + number("ENUMERATED", 1000), Made::Wide));
 }
 
 /// Not an exact test: long chains of the default plan, started from the prior, come close
