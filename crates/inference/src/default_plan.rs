@@ -272,11 +272,11 @@ impl Program {
                 _ => return None,
             };
             let counts = tables.counts();
-            let made = Elimination::new(&counts, &tables.factors, LARGEST).ok()?;
             let sweep = |f: &Factor| f.scope.iter().map(|x| counts[*x]).sum::<usize>();
-            joint.entries = joint.entries.max(made.entries());
             joint.sweep = joint.sweep.max(tables.factors.iter().map(sweep).sum());
             joint.coupled |= tables.factors.iter().any(|f| f.scope.len() > 1);
+            let made = Elimination::new(&counts, tables.factors, LARGEST).ok()?;
+            joint.entries = joint.entries.max(made.entries());
         }
         Some(joint)
     }

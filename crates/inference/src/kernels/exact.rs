@@ -95,12 +95,13 @@ impl Exact {
         }
         self.last = None;
         let (identity, observed) = (Arc::clone(trace.identity()), Arc::clone(observed));
-        let tables = match trace.tabulate(selection, at.power, at.draws(0))? {
+        let mut tables = match trace.tabulate(selection, at.power, at.draws(0))? {
             Tabulation::Tables(tables) => tables,
             Tabulation::Fails => return Ok(Err(NoTables::Fails)),
             Tabulation::Refused(e) => return Ok(Err(NoTables::Refused(e))),
         };
-        let made = Elimination::new(&tables.counts(), &tables.factors, LARGEST);
+        let factors = std::mem::take(&mut tables.factors);
+        let made = Elimination::new(&tables.counts(), factors, LARGEST);
         let elimination = match made {
             Ok(elimination) => elimination,
             Err(e) => return Ok(Err(NoTables::Refused(too_large(trace, selection, e)))),

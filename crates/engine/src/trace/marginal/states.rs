@@ -29,7 +29,7 @@ pub(super) struct Sites {
     /// By factor: the choices that it depends on, in ascending order.
     pub scopes: BTreeMap<NodeId, Vec<usize>>,
     /// Whether what is read is known to be the same in all states.
-    pub same: bool,
+    same: bool,
 }
 
 /// Why not all states can be visited.
