@@ -13,6 +13,7 @@ use crate::common::snapshots;
 use pcadlang::{Error, Program, RunOptions};
 use pcadlang_syntax::diag::{Diagnostic, IntoDiagnostic, SourceMap, render};
 use pcadlang_syntax::parse;
+use std::collections::HashSet;
 use std::path::Path;
 
 /// Returns the errors of the program at a path in some phase.
@@ -98,38 +99,34 @@ const PHASES: [(&str, &str, Diagnose); 4] = [
     ("runtime", "Errors during a run", running),
 ];
 
-/// `REGENERATE=1 cargo test --release --test language -- errors::` rewrites the
-/// catalogue.
+/// Of each kind of mistake the first message with its hint; of those during a run, which
+/// depend on the program, the message alone. `tests/snapshots` has the complete messages.
 #[test]
-fn the_catalogue_is_up_to_date() {
+fn the_page_of_messages_is_up_to_date() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut text = String::from(
-        "# Mistakes and their messages\n\nEach program in `programs/errors` has one kind of mistake, followed here by the message of \
-         `pcadlang`.\n`REGENERATE=1 cargo test --release --test language -- errors::` writes this page, and the tests keep it up to date.\n",
+        "# Mistakes and their messages\n\n\
+         What `pcadlang` says of each kind of mistake, with its hint. The programs are in\n\
+         `programs/errors`, the complete messages with their places in `tests/snapshots`; both\n\
+         are tested, and `REGENERATE=1 cargo test --release --test language -- errors::` writes\n\
+         this page.\n",
     );
     for (phase, title, diagnose) in PHASES {
-        text += &format!("\n## {title}\n");
+        text += &format!("\n## {title}\n\n");
         let mut programs: Vec<_> = std::fs::read_dir(root.join("programs/errors").join(phase))
             .unwrap()
             .map(|f| f.unwrap().path())
             .filter(|p| p.extension().is_some_and(|e| e == "pcad"))
             .collect();
         programs.sort();
+        let mut written = HashSet::new();
         for path in programs {
-            let name = path.file_stem().unwrap().to_string_lossy().replace('_', " ");
-            let program = std::fs::read_to_string(&path).unwrap();
-            let said = message(&path, diagnose);
-            let lines = |s: &str| {
-                s.trim_end()
-                    .lines()
-                    .map(|l| format!("    {l}").trim_end().to_owned() + "\n")
-                    .collect::<String>()
-            };
-            text += &format!(
-                "\n### {name}\n\n{}\n```text\n{}\n```\n",
-                lines(&program),
-                said.trim_end()
-            );
+            let first = diagnose(&path).diagnostics.swap_remove(0);
+            let hint = first.hints.first().filter(|_| phase != "runtime");
+            if written.insert(first.message.clone()) {
+                let hint = hint.map_or(String::new(), |h| format!(" {h}"));
+                text += &format!("- **{}**{hint}\n", first.message);
+            }
         }
     }
     let path = root.join("docs/reference/mistakes.md");

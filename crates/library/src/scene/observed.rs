@@ -86,7 +86,7 @@ impl ImageValue {
     /// The minimum strength of a contour point: weaker ones are more often texture than
     /// outline. The detector's own best threshold against human outlines is 0.47, and a
     /// few more edges help where the object is dim
-    /// (docs/measurements/earlier_objects.md).
+    /// (docs/measurements/objects.md).
     pub(super) const STRONG: f32 = 0.4;
 
     /// Creates an image of a photograph; its contours are detected when they are needed.

@@ -86,25 +86,49 @@ pub fn reference(table: &Table) -> String {
         }
     }
     for section in sections {
+        let built_ins: Vec<&Builtin> = table.iter().filter(|b| b.section == section).collect();
+        let shared = shared(&built_ins);
         let _ = write!(s, "\n## {section}\n\n");
-        for b in table.iter().filter(|b| b.section == section) {
+        if !shared.is_empty() {
+            let _ = write!(s, "Unless described otherwise: {}\n\n", shared.join(" "));
+        }
+        for b in built_ins {
             let _ = write!(s, "- **`{}`**", b.signature());
             if let Some(what) = result_type(b) {
                 let _ = write!(s, " → {what}");
             }
-            let _ = writeln!(s, ". {}", b.doc);
-            for a in b.args.iter() {
-                let _ = writeln!(s, "  - `{}`: {} {}", a.name, traits(a), a.doc);
+            let _ = write!(s, ". {}", b.doc);
+            let arguments = b.args.iter().map(described).filter(|a| !shared.contains(a));
+            let notes = notes(b).into_iter().map(|(what, text)| format!("*{what}*: {text}."));
+            let rest: Vec<String> = arguments.chain(notes).collect();
+            if !rest.is_empty() {
+                let _ = write!(s, "\\\n  {}", rest.join(" "));
             }
-            for (what, text) in notes(b) {
-                let _ = writeln!(s, "  - *{what}*: {text}");
-            }
-            if let Some(example) = b.example.as_deref() {
-                let _ = writeln!(s, "  ```pcad\n{}  ```", indented(example, "  "));
-            }
+            s.push('\n');
         }
     }
     s
+}
+
+/// The description of an argument; its default is in the signature.
+fn described(a: &Argument) -> String {
+    let unit = if a.unit.is_empty() { String::new() } else { format!(", {}", a.unit) };
+    format!("`{}`: {}{unit}. {}", a.name, a.ty, a.doc)
+}
+
+/// The descriptions that several built-ins of a section have, at most one of each name.
+fn shared(built_ins: &[&Builtin]) -> Vec<String> {
+    let all: Vec<&Argument> = built_ins.iter().flat_map(|b| b.args.iter()).collect();
+    let times = |a: &Argument| all.iter().filter(|b| described(b) == described(a)).count();
+    let mut found: Vec<&Argument> = Vec::new();
+    for &a in all.iter().filter(|a| times(a) > 1) {
+        match found.iter_mut().find(|b| b.name == a.name) {
+            Some(b) if times(a) > times(b) => *b = a,
+            Some(_) => {}
+            None => found.push(a),
+        }
+    }
+    found.into_iter().map(described).collect()
 }
 
 /// The type of the result, unless it is `any`.
