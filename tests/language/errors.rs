@@ -106,10 +106,9 @@ fn the_page_of_messages_is_up_to_date() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut text = String::from(
         "# Mistakes and their messages\n\n\
-         What `pcadlang` says of each kind of mistake, with its hint. The programs are in\n\
-         `programs/errors`, the complete messages with their places in `tests/snapshots`; both\n\
-         are tested, and `REGENERATE=1 cargo test --release --test language -- errors::` writes\n\
-         this page.\n",
+         What `pcadlang` says of each kind of mistake, before a run with its hint. The programs\n\
+         are in `programs/errors`, the complete messages with their places in `tests/snapshots`.\n\
+         `REGENERATE=1 cargo test --release --test language -- errors::` writes this page.\n",
     );
     for (phase, title, diagnose) in PHASES {
         text += &format!("\n## {title}\n\n");
