@@ -9,7 +9,6 @@ mod camera;
 mod camera_json;
 mod canvas;
 mod derivatives;
-mod detail;
 mod image_bounds;
 mod lines;
 mod pixels;

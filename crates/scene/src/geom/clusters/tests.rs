@@ -4,7 +4,7 @@ use super::*;
 use crate::geom::{Mesh, Solid};
 
 fn ball() -> Solid {
-    Solid::sphere(1.0, 50).unwrap()
+    Solid::new(crate::geom::sphere(1.0, 50).unwrap().into())
 }
 
 /// The leaves below a node, in order.

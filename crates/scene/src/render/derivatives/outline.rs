@@ -31,9 +31,8 @@ impl View {
     /// [`View::fractions`], which is no step function.
     pub fn vjp_fractions(&self, size: u32, gain: &[f64]) -> Vec<DVec3> {
         let camera = self.camera().scaled_to(size);
-        let drawn = self.drawn(&camera);
-        if let Some(by_vertex) = self.covered(size).vjp(&drawn.solid, &camera, gain) {
-            return drawn.by_vertices_of(self.solid(), by_vertex);
+        if let Some(by_vertex) = self.covered(size).vjp(self.solid(), &camera, gain) {
+            return by_vertex;
         }
         self.vjp_outline(size, |picture, piece, length| {
             let [x, y, tx, ty] = piece.map(f64::from);
@@ -55,26 +54,24 @@ impl View {
     ) -> Vec<DVec3> {
         let frame = self.depth(size);
         let camera = self.camera().scaled_to(size);
-        let drawn = self.drawn(&camera);
         let picture = Picture { width: camera.width, height: camera.height, depth: &frame.depth };
         let by = |[x, y, tx, ty]: [f32; 4], length: f32| {
             let [nx, ny] = picture.outward([x, y, tx, ty])?;
             let by = f64::from(length) * gain(&picture, [x, y, tx, ty], length);
             Some([by * nx, by * ny])
         };
-        if drawn.solid.revolution().is_some() {
+        if self.solid().revolution().is_some() {
             let c = self.contours(size);
             let one = |i: usize| match by([c.x[i], c.y[i], c.tx[i], c.ty[i]], c.length[i]) {
                 Some([x, y]) => [x, y, 0.0, 0.0],
                 None => [0.0; 4],
             };
             let by_piece: Vec<[f64; 4]> = (0..c.len()).map(one).collect();
-            return vjp_turned(&drawn.solid, &camera, &by_piece).unwrap_or_default();
+            return vjp_turned(self.solid(), &camera, &by_piece).unwrap_or_default();
         }
-        let by_vertex = vjp_some(&drawn.solid, &camera, &frame.depth, |piece| {
+        vjp_some(self.solid(), &camera, &frame.depth, |piece| {
             by([piece.x, piece.y, piece.tx, piece.ty], piece.length)
-        });
-        drawn.by_vertices_of(self.solid(), by_vertex)
+        })
     }
 }
 

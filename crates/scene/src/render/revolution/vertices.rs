@@ -133,17 +133,17 @@ mod tests {
     #[test]
     fn what_a_view_shows_does_not_depend_on_what_was_drawn_before() {
         let camera = Camera::default_for(96, 80);
-        let view = |detail: f64| View::with_detail(placed([0.0; 8]), camera, detail);
-        let wanted = view(0.0).contours(96);
-        let other = view(0.5);
+        let view = || View::new(placed([0.0; 8]), camera);
+        let wanted = view().contours(96);
+        let other = view();
         assert_eq!(other.depth(96).depth, other.frame(96).depth);
         assert_eq!(*other.contours(96), *wanted);
         assert!(other.change(96).all_move());
-        let next = view(0.0).after(&other);
+        let next = view().after(&other);
         assert_eq!(*next.contours(96), *wanted);
         // Views of depth alone that follow one another.
         let moved = [[0.0; 8], [0.1; 8], [0.0; 8], [0.0; 8]].map(placed);
-        let mut last = view(0.0);
+        let mut last = view();
         for solid in moved {
             let wanted = View::new(solid.clone(), camera).depth(96);
             last = View::new(solid, camera).after(&last);

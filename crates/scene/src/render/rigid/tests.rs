@@ -4,7 +4,7 @@
 use super::hiding::Hiding;
 use super::pieces::{Found, extract_posed};
 use super::*;
-use crate::geom::{Affine, Caps, Profile};
+use crate::geom::{self, Affine, Caps, Profile};
 use crate::render::lines::extraction::{Room, extract_mesh};
 use crate::render::lines::silhouette::Crossed;
 use crate::render::pixels::project::{Projected, project};
@@ -61,7 +61,7 @@ fn soup(random: &mut Uniform, count: usize) -> Solid {
 fn meshes() -> Vec<(&'static str, Solid)> {
     let mut random = Uniform(5);
     let profile = [Profile { y: vec![-1.0, -0.2, 0.3, 1.0], r: vec![0.6, 0.3, 0.7, 0.2] }];
-    let closed = |wall, caps| Solid::lathe(&profile, 60, wall, caps).unwrap();
+    let closed = |wall, caps| Solid::new(geom::lathe(&profile, 60, wall, caps).unwrap().into());
     let steps: Vec<(f32, f32)> = (0..24)
         .map(|i| (if i / 2 % 2 == 0 { 0.4 } else { 0.7 }, (i + 1) as f32 / 12.0 / 2.0))
         .collect();
