@@ -6,7 +6,6 @@
 mod affine;
 pub mod armature;
 mod bounds;
-mod clusters;
 mod cuboid;
 mod edges;
 mod error;
@@ -28,8 +27,6 @@ mod sphere;
 
 pub use affine::Affine;
 pub use bounds::Bounds;
-pub use clusters::Clusters;
-pub(crate) use clusters::{Faces, Few, LEAF, Node, Shape, Trees, WIDE};
 pub use cuboid::{cuboid, vjp_cuboid};
 pub use error::GeomError;
 pub use frame::{FileFrame, UpAxis};

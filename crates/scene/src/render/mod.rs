@@ -13,7 +13,6 @@ mod image_bounds;
 mod lines;
 mod pixels;
 mod revolution;
-mod rigid;
 mod view;
 mod work;
 
