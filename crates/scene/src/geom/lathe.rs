@@ -100,40 +100,6 @@ impl Solid {
     }
 }
 
-impl Revolution {
-    /// The surface that [`lathe`] makes a mesh of, with any number of sides.
-    ///
-    /// # Errors
-    /// As [`lathe`].
-    pub fn lathe(
-        parts: &[Profile],
-        wall: impl Into<Wall>,
-        caps: Caps,
-    ) -> Result<Revolution, GeomError> {
-        let wall = wall.into();
-        check(parts, FEWEST_SIDES, wall)?;
-        let Layout { strips, closed } = layout(parts, caps, wall, |x| x)?;
-        Ok(Revolution::new(&strips, closed, parts.len() as u16 + 5))
-    }
-
-    /// The vector-Jacobian product of [`Revolution::lathe`], given derivatives with respect
-    /// to the radius and the height of each ring. Which points are merged and which ends
-    /// are closed is held fixed.
-    ///
-    /// # Errors
-    /// As [`lathe`].
-    pub fn vjp_lathe(
-        parts: &[Profile],
-        wall: impl Into<Wall>,
-        caps: Caps,
-        by_ring: &[(f64, f64)],
-    ) -> Result<LatheGradient, GeomError> {
-        let wall = wall.into();
-        check(parts, FEWEST_SIDES, wall)?;
-        vjp_layout(parts, wall, caps, |_| by_ring.to_vec())
-    }
-}
-
 /// Derivatives with respect to the inputs of [`lathe`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LatheGradient {

@@ -28,6 +28,5 @@ pub use batch::{BatchRenderer, ContourBatch, Cores, Scene};
 pub use camera::{Camera, CameraError, Projection};
 pub use pixels::frame::{Channels, Frame, FrameChange};
 pub use pixels::shade::shade;
-pub use revolution::RevolutionGradient;
 pub use view::View;
 pub use work::{Work, work};

@@ -48,7 +48,8 @@ impl Vessel {
     }
 
     pub fn exact(&self) -> Revolution {
-        Revolution::lathe(&self.parts, self.wall, self.caps).unwrap()
+        let solid = Solid::exact_lathe(&self.parts, 96, self.wall, self.caps).unwrap();
+        Revolution::clone(&solid.revolution().unwrap().surface)
     }
 }
 
