@@ -6,7 +6,7 @@
 
 use super::canvas::Canvas;
 use super::pixels::fractions::Fractions;
-use super::{Camera, Channels, ContourChange, Contours, Frame, FrameChange};
+use super::{Camera, Channels, ContourChange, Contours, Frame};
 use crate::geom::Solid;
 use glam::DVec3;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -21,8 +21,6 @@ pub struct View {
     /// What it shares with the views before and after it.
     canvas: Canvas,
     frames: BySize<Arc<Frame>>,
-    /// `None` where the picture is better drawn in full.
-    frame_changes: BySize<Option<Arc<FrameChange>>>,
     depths: BySize<Arc<Frame>>,
     fractions: BySize<Arc<Fractions>>,
     contours: BySize<Arc<Contours>>,
@@ -49,7 +47,6 @@ impl View {
             camera,
             canvas: Canvas::default(),
             frames: Mutex::default(),
-            frame_changes: Mutex::default(),
             depths: Mutex::default(),
             fractions: Mutex::default(),
             contours: Mutex::default(),
@@ -87,25 +84,9 @@ impl View {
 
     /// All channels of the picture whose longer side has `size` pixels (0 counts as 1).
     pub fn frame(&self, size: u32) -> Arc<Frame> {
-        // Not while the frames are locked: `frame_change` locks both the other way round.
-        let on_canvas = find(&self.frame_changes, size).flatten();
         once(&self.frames, size, || {
             let camera = self.camera.scaled_to(size);
-            let kept = on_canvas.and_then(|_| self.canvas.frame(&self.solid, &camera));
-            Arc::new(kept.unwrap_or_else(|| drawn_frame(&self.solid, &camera, Channels::All)))
-        })
-    }
-
-    /// The difference of [`View::frame`] from the frame drawn last on the same canvas, without
-    /// building the frame; `None` if the picture is better drawn in full.
-    pub fn frame_change(&self, size: u32) -> Option<Arc<FrameChange>> {
-        once(&self.frame_changes, size, || {
-            // The canvas has meshes only.
-            if self.solid.revolution().is_some() || find(&self.frames, size).is_some() {
-                return None;
-            }
-            let change = self.canvas.frame_change(&self.solid, &self.camera.scaled_to(size));
-            change.map(Arc::new)
+            Arc::new(drawn_frame(&self.solid, &camera, Channels::All))
         })
     }
 
