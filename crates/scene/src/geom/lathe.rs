@@ -95,7 +95,6 @@ impl Solid {
             mesh: Arc::new(revolve(&strips, sides, closed, count)),
             affine: Affine::IDENTITY,
             first_part: 0,
-            skin: None,
         }))
     }
 }
