@@ -162,7 +162,7 @@ fn vjp_layout(
 /// The path that a lathe sweeps.
 struct Layout<T> {
     strips: Vec<Strip<T>>,
-    /// Whether the path ends where it starts.
+    /// True if the path ends where it starts.
     closed: bool,
 }
 

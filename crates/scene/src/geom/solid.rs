@@ -87,7 +87,7 @@ impl Meshes {
         MeshesMark(Arc::downgrade(&self.0))
     }
 
-    /// Whether the mark identifies this list.
+    /// True if the mark identifies this list.
     pub fn is(&self, mark: &MeshesMark) -> bool {
         std::ptr::eq(mark.0.as_ptr(), Arc::as_ptr(&self.0))
     }

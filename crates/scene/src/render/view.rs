@@ -18,7 +18,7 @@ type BySize<T> = Mutex<Vec<(u32, T)>>;
 pub struct View {
     solid: Solid,
     camera: Camera,
-    /// What it shares with the views before and after it.
+    /// Shared with the views before and after it.
     canvas: Canvas,
     frames: BySize<Arc<Frame>>,
     depths: BySize<Arc<Frame>>,
@@ -171,7 +171,7 @@ impl View {
         self.contours(size).vjp(&self.solid, &camera, by_piece)
     }
 
-    /// Whether contours of this size are drawn, or expected to be asked for.
+    /// True if contours of this size are drawn, or expected to be asked for.
     fn expects_contours(&self, size: u32) -> bool {
         self.expected.contours.contains(&size) || find(&self.changes, size).is_some()
     }
