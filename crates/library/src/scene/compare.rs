@@ -125,12 +125,8 @@ pub(super) const TABLE: &[Row] = &[
 ];
 
 /// Describes the approximations in rendering.
-pub(super) fn drawn(view: &View, size: u32) -> String {
-    let coarse = match view.detail() {
-        0.0 => String::new(),
-        d => format!(", contours from meshes simplified by up to {d} pixels"),
-    };
-    format!("rendered at {size} pixels in single precision{coarse}")
+pub(super) fn drawn(size: u32) -> String {
+    format!("rendered at {size} pixels in single precision")
 }
 
 pub(super) fn likelihood(l: impl Likelihood + 'static) -> Result<Value, Fault> {
@@ -287,7 +283,7 @@ impl Likelihood for ContourOf {
     fn approximations(&self) -> Vec<String> {
         let cut =
             format!("edges beyond {}% of the diagonal are not matched", self.options.truncate);
-        vec![drawn(&self.view, self.size), cut]
+        vec![drawn(self.size), cut]
     }
 }
 
@@ -356,7 +352,7 @@ impl Likelihood for ChamferOf {
             "of more than {} observed points, an evenly spaced subset is used",
             chamfer::MOST_OBSERVED
         );
-        [Some(drawn(&self.view, self.size)), cut, self.options.symmetric.then_some(most)]
+        [Some(drawn(self.size)), cut, self.options.symmetric.then_some(most)]
             .into_iter()
             .flatten()
             .collect()
@@ -401,7 +397,7 @@ impl Likelihood for MaskOf {
     }
 
     fn approximations(&self) -> Vec<String> {
-        vec![drawn(&self.view, self.size)]
+        vec![drawn(self.size)]
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {
@@ -465,11 +461,7 @@ impl DepthOf {
             ));
         };
         same_shape((depth.depth.width(), depth.depth.height()), &self.view, "scene.depth")?;
-        // Simplified meshes have other depths.
-        let frame = match self.view.detail() {
-            0.0 => self.view.depth(self.size),
-            _ => self.view.frame(self.size),
-        };
+        let frame = self.view.depth(self.size);
         let prepared = depth.prepared.get(
             (self.options, frame.width, frame.height),
             |([sd, outlier, near, far], w, h)| {
@@ -487,7 +479,7 @@ impl Likelihood for DepthOf {
     }
 
     fn approximations(&self) -> Vec<String> {
-        vec![drawn(&self.view, self.size)]
+        vec![drawn(self.size)]
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, String> {

@@ -4,7 +4,7 @@
 //! each has one normal; edges know the faces on both sides across such splits. Meshes of
 //! one shape share their [`Topology`].
 
-use super::{Bounds, Clusters, Patches, Shape, Trees};
+use super::{Bounds, Patches};
 use glam::Vec3;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -19,17 +19,17 @@ pub struct Edge {
     pub vertices: [u32; 2],
     /// The adjacent faces; the second is [`NO_FACE`] on a boundary.
     pub faces: [u32; 2],
-    /// Whether the surface bends sharply here.
+    /// True if the surface bends sharply here.
     pub crease: bool,
 }
 
 impl Edge {
-    /// Whether only one side has a face.
+    /// True if only one side has a face.
     pub fn is_boundary(&self) -> bool {
         self.faces[1] == NO_FACE
     }
 
-    /// Whether it shows as a line from every viewpoint: a crease or a boundary.
+    /// True if it shows as a line from every viewpoint: a crease or a boundary.
     pub fn is_sharp(&self) -> bool {
         self.crease || self.is_boundary()
     }
@@ -91,7 +91,7 @@ impl Edges {
         firsts.zip(&self.runs).map(|(first, past)| &self.list[first..*past])
     }
 
-    /// Whether there are boundary edges.
+    /// True if there are boundary edges.
     pub fn open(&self) -> bool {
         self.open
     }
@@ -125,7 +125,7 @@ pub struct Topology {
     pub part_names: Vec<Arc<str>>,
     /// The edges.
     pub edges: Edges,
-    /// Whether the faces are known to enclose a body without crossing each other. Seen
+    /// True if the faces are known to enclose a body without crossing each other. Seen
     /// from outside, faces that point away from the camera are then hidden by others and
     /// need not be drawn. Meshes from files do not promise this.
     pub encloses: bool,
@@ -142,8 +142,6 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// The triangles, parts and edges.
     pub topology: Arc<Topology>,
-    /// Its faces in clusters, if it is drawn often.
-    pub clusters: Clusters,
 }
 
 /// The angle between faces, in degrees, above which an edge is a crease.
@@ -159,19 +157,7 @@ pub const MOST_PARTS: usize = u16::MAX as usize;
 impl Mesh {
     /// Puts a mesh together from its vertices, a unit normal for each, and the rest.
     pub fn of(positions: Vec<Vec3>, normals: Vec<Vec3>, topology: Arc<Topology>) -> Mesh {
-        Mesh { positions, normals, topology, clusters: Clusters::default() }
-    }
-
-    /// Counts a drawing of the mesh, and returns the trees of its faces if it has been drawn
-    /// often.
-    pub(crate) fn drawn(&self) -> Option<&Trees> {
-        self.clusters.drawn(self.shape())
-    }
-
-    /// What clusters are made from.
-    pub(crate) fn shape(&self) -> Shape<'_> {
-        let Mesh { positions, normals, topology, .. } = self;
-        Shape { positions, normals, triangles: &topology.triangles }
+        Mesh { positions, normals, topology }
     }
 
     /// Returns the bounding box.

@@ -21,7 +21,7 @@ pub(super) struct Strip<T = f64> {
     pub points: Vec<(T, T)>,
     /// The part of each segment.
     pub parts: Vec<u16>,
-    /// Whether the seam to the previous strip is smooth although its normals differ.
+    /// True if the seam to the previous strip is smooth although its normals differ.
     pub blend: bool,
 }
 
@@ -31,7 +31,7 @@ struct Signature {
     sides: u32,
     closed: bool,
     part_count: u16,
-    /// Whether the path never goes down, and so cannot cross itself.
+    /// True if the path never goes down, and so cannot cross itself.
     rising: bool,
     /// For each strip: the number of points, flags for poles and blend, then the parts of
     /// its segments.
@@ -70,16 +70,6 @@ pub(super) fn ring_normal([a, b]: [(f64, f64); 2]) -> (f64, f64) {
     let (nr, ny) = (b.1 - a.1, -(b.0 - a.0));
     let length = libm::hypot(nr, ny);
     if length > 0.0 { (nr / length, ny / length) } else { (1.0, 0.0) }
-}
-
-/// Returns the topology of [`revolve`]'s mesh.
-pub(super) fn topology_of(
-    strips: &[Strip],
-    sides: u32,
-    closed: bool,
-    part_count: u16,
-) -> Arc<Topology> {
-    shared(strips, sides, closed, part_count).topology
 }
 
 fn shared(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Shared {

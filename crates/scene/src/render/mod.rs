@@ -4,17 +4,14 @@
 //! in this module draws random numbers, and the same input gives the same output on every
 //! machine.
 
-mod batch;
 mod camera;
 mod camera_json;
 mod canvas;
 mod derivatives;
-mod detail;
 mod image_bounds;
 mod lines;
 mod pixels;
 mod revolution;
-mod rigid;
 mod view;
 mod work;
 
@@ -26,10 +23,8 @@ mod testing;
 use pcadlang_numerics::num::simd;
 
 pub use crate::contours::{ContourChange, ContourSlice, Contours};
-pub use batch::{BatchRenderer, ContourBatch, Cores, Scene};
 pub use camera::{Camera, CameraError, Projection};
-pub use pixels::frame::{Channels, Frame, FrameChange};
+pub use pixels::frame::{Channels, Frame};
 pub use pixels::shade::shade;
-pub use revolution::RevolutionGradient;
 pub use view::View;
 pub use work::{Work, work};

@@ -11,7 +11,7 @@ use glam::DVec3;
 use pcadlang_engine::lang::builtins::{Row, Type, arg, opt};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
-use pcadlang_scene::geom::{Affine, Landmark, Solid, cuboid};
+use pcadlang_scene::geom::{Affine, Landmark, Solid, cuboid, lathe, sphere};
 use std::sync::Arc;
 
 const SECTION: &str = "Shapes";
@@ -56,7 +56,7 @@ pub(super) const TABLE: &[Row] = &[
             let LatheArgs { profiles, sides, round, wall, caps } = lathe_args(a)?;
             let made = match round {
                 true => Solid::exact_lathe(&profiles, sides, wall, caps),
-                false => Solid::lathe(&profiles, sides, wall, caps),
+                false => lathe(&profiles, sides, wall, caps).map(|m| Solid::new(Arc::new(m))),
             };
             made.map(solid).map_err(fault)
         },
@@ -73,7 +73,7 @@ pub(super) const TABLE: &[Row] = &[
         "A sphere centred at the origin.",
         |a| {
             let sides = if a.given(1) { a.int_in(1, 4, 1024)? as u32 } else { 32 };
-            Solid::sphere(a.num(0)?, sides).map(solid).map_err(fault)
+            sphere(a.num(0)?, sides).map(|m| solid(Solid::new(Arc::new(m)))).map_err(fault)
         },
     )
     .vjp(vjps::sphere),

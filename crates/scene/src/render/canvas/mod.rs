@@ -1,4 +1,4 @@
-//! What successive drawings of one scene share. A view that follows another one in a node
+//! State shared by successive drawings of one scene. A view that follows another one in a node
 //! of a trace takes over its canvas, so a drawing costs what the change costs.
 //!
 //! The meshes of a scene are **layers** of a picture. Those that stand still are merged
@@ -10,39 +10,37 @@
 //! Invariant: a picture depends on the solid and the camera alone, bit for bit: a canvas
 //! only saves work.
 
-mod channels;
 mod dynamic_mesh;
 mod layer;
 mod meshes;
 mod picture;
-mod static_channels;
 mod static_layer;
 
 use self::layer::{Shows, Tools, camera_bits};
-use self::picture::Picture;
-use super::{Camera, ContourChange, Contours, Frame, FrameChange};
+use self::picture::IncrementalImage;
+use super::{Camera, ContourChange, Contours};
 use crate::geom::Solid;
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
-/// The number of pictures that a canvas keeps: several cameras or sizes, with contours, with
-/// all channels, or with depth alone.
+/// The number of pictures that a canvas keeps: several cameras or sizes, with contours or with
+/// depth alone.
 const PICTURES: usize = 4;
 
 /// A shared canvas. Clones draw on the same one; a new canvas is empty.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Canvas(Arc<Mutex<Pictures>>);
+pub(super) struct Canvas(Arc<Mutex<ImageCache>>);
 
 /// The pictures of a canvas, the one drawn last first.
 #[derive(Default)]
-struct Pictures {
-    pictures: Vec<Picture>,
+struct ImageCache {
+    pictures: Vec<IncrementalImage>,
     /// Large, and most canvases are never drawn on: made when it is needed.
     tools: Option<Box<Tools>>,
 }
 
-impl std::fmt::Debug for Pictures {
+impl std::fmt::Debug for ImageCache {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Pictures").field("count", &self.pictures.len()).finish()
+        f.debug_struct("ImageCache").field("count", &self.pictures.len()).finish()
     }
 }
 
@@ -70,28 +68,6 @@ impl Canvas {
         self.shown(solid, (camera, shows), |picture| picture.depth().to_vec())
     }
 
-    /// All channels of a solid; `None` if it is better drawn in full.
-    pub(super) fn frame(&self, solid: &Solid, camera: &Camera) -> Option<Frame> {
-        self.shown(solid, (camera, Shows::Channels), |picture| {
-            let (depth, channels) = (picture.depth().to_vec(), picture.channels());
-            let (part, normal) = (channels.part.clone(), channels.normal.clone());
-            Frame { width: camera.width, height: camera.height, depth, part, normal }
-        })
-    }
-
-    /// The change from the previous parts and normals; `None` if the solid is better drawn
-    /// in full.
-    pub(super) fn frame_change(&self, solid: &Solid, camera: &Camera) -> Option<FrameChange> {
-        self.with_picture((camera, Shows::Channels), |picture, tools| {
-            let ContourChange { from, to, .. } = picture.draw(solid, camera, tools)?;
-            let channels = picture.channels();
-            let at = || channels.changed.iter().map(|pixel| *pixel as usize);
-            let part = at().map(|at| channels.part[at]).collect();
-            let normal = at().map(|at| channels.normal[at]).collect();
-            Some(FrameChange { from, to, pixels: channels.changed.clone(), part, normal })
-        })
-    }
-
     /// The change from the previous contours in this picture; `None` if the solid is
     /// better drawn in full.
     pub(super) fn change(&self, solid: &Solid, camera: &Camera) -> Option<ContourChange> {
@@ -106,7 +82,7 @@ impl Canvas {
         &self,
         solid: &Solid,
         (camera, shows): (&Camera, Shows),
-        take: impl FnOnce(&Picture) -> T,
+        take: impl FnOnce(&IncrementalImage) -> T,
     ) -> Option<T> {
         self.with_picture((camera, shows), |picture, tools| {
             if !picture.shows(solid) {
@@ -119,16 +95,16 @@ impl Canvas {
     fn with_picture<T>(
         &self,
         (camera, shows): (&Camera, Shows),
-        work: impl FnOnce(&mut Picture, &mut Tools) -> Option<T>,
+        work: impl FnOnce(&mut IncrementalImage, &mut Tools) -> Option<T>,
     ) -> Option<T> {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let Pictures { pictures, tools } = &mut *all;
+        let ImageCache { pictures, tools } = &mut *all;
         let eye = camera_bits(camera);
         match pictures.iter().position(|p| p.is_of(&eye, shows)) {
             Some(at) => pictures[..=at].rotate_right(1),
             None => {
                 pictures.truncate(PICTURES - 1);
-                pictures.insert(0, Picture::new(eye, shows));
+                pictures.insert(0, IncrementalImage::new(eye, shows));
             }
         }
         work(pictures.first_mut()?, tools.get_or_insert_default())

@@ -1,7 +1,6 @@
-//! The stationary meshes of a scene: their depth, parts and normals, and their pieces of
-//! contour by the pixels at which they are tested.
+//! The stationary meshes of a scene: their depth, and their pieces of contour by the
+//! pixels at which they are tested.
 
-use super::static_channels::StaticChannels;
 use crate::render::Camera;
 use crate::render::lines::visibility::{DepthTest, Depths, Piece};
 use crate::render::pixels::area::Area;
@@ -21,8 +20,6 @@ const SHOWN: u8 = 0b100;
 #[derive(Default)]
 pub struct StaticLayer {
     pub depth: Vec<f32>,
-    /// Parts and normals, if the picture shows them.
-    pub channels: StaticChannels,
     pub range: DepthRange,
     /// All pieces, with the index of their mesh.
     pub pieces: Vec<(Piece, usize)>,
@@ -63,7 +60,7 @@ impl StaticLayer {
         }
     }
 
-    /// Whether this layer hides a whole mesh, contours included, whose depth range is
+    /// True if this layer hides a whole mesh, contours included, whose depth range is
     /// `range` and whose pixels all lie in `area`.
     pub fn hides(&self, range: &DepthRange, area: &Area, camera: &Camera) -> bool {
         let (limit, width) = (Depths::hiding(self.extents[1], range), camera.width as usize);
@@ -80,7 +77,7 @@ impl StaticLayer {
                 .all(|row| self.depth.get(row).is_some_and(|row| row.iter().all(near)))
     }
 
-    /// Whether the sorted pieces are valid for a depth range.
+    /// True if the sorted pieces are valid for a depth range.
     pub fn holds(&self, extent: f64) -> bool {
         let [least, most] = self.extents;
         self.pieces.is_empty() || least <= extent && extent <= most

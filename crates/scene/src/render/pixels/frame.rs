@@ -15,7 +15,6 @@ use crate::render::simd::vectorised;
 use crate::render::{Camera, work};
 use glam::{DVec3, Vec3};
 use std::cell::RefCell;
-use std::sync::Arc;
 
 /// Which channels to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,23 +41,6 @@ pub struct Frame {
     pub normal: Vec<[f32; 3]>,
 }
 
-/// A change from one frame to another, at the pixels whose part or normal differs. A frame is
-/// identified by the address of its `Arc`.
-#[derive(Debug)]
-pub struct FrameChange {
-    /// Identifies the frame before. If it is unknown, a new identity that nobody holds, and
-    /// no pixels are listed.
-    pub from: Arc<()>,
-    /// Identifies the frame now.
-    pub to: Arc<()>,
-    /// The pixels, numbered row by row, each once.
-    pub pixels: Vec<u32>,
-    /// Their parts now, as in [`Frame`].
-    pub part: Vec<u16>,
-    /// Their normals now.
-    pub normal: Vec<[f32; 3]>,
-}
-
 thread_local! {
     /// Scratch memory reused from frame to frame: projected vertices, candidate triangles
     /// and shading.
@@ -81,7 +63,7 @@ impl Frame {
         Frame { width, height, depth, part: Vec::new(), normal: Vec::new() }
     }
 
-    /// Whether each pixel shows the object, row by row.
+    /// For each pixel, row by row, true if it shows the object.
     pub fn mask(&self) -> impl Iterator<Item = bool> + '_ {
         self.depth.iter().map(|d| d.is_finite())
     }

@@ -119,7 +119,7 @@ pub(in crate::render) fn put_face(faces: &mut [u32], at: usize, face: u32, neare
     }
 }
 
-/// Whether a triangle has no area.
+/// True if a triangle has no area.
 #[inline(always)]
 fn is_flat(points: &[Point; 3]) -> bool {
     let area = area(points);
@@ -177,29 +177,6 @@ impl Triangle {
         self.coverage.runs(&self.points, |row, from, to| {
             draw(&Run { row, from, to, nearness: self.plane.row(row), step, origin, limits });
         });
-    }
-
-    /// The nearness that [`Triangle::within`] draws at one pixel; `None` if it draws nothing
-    /// there.
-    #[inline(always)]
-    pub fn nearness_at(
-        points: &[Point; 3],
-        places: [Place; 3],
-        (size, back): (Vec4, f64),
-        [column, row]: [usize; 2],
-    ) -> Option<f32> {
-        let extent = Extent::around(places, size);
-        if extent.is_empty() {
-            return None;
-        }
-        let coverage = Coverage::new(places, || *points, extent, back)?;
-        if !coverage.covers(points, column, row) {
-            return None;
-        }
-        let plane = Plane::new(points, coverage.columns[0])?;
-        let Plane { step, origin, limits, .. } = plane;
-        let (from, to, nearness) = (column, column + 1, plane.row(row));
-        Some(Run { row, from, to, nearness, step, origin, limits }.nearness(column))
     }
 
     /// Merges the triangle into the rows of an area, keeping the nearer value. With a set
