@@ -33,6 +33,7 @@ pub use clusters::Clusters;
 pub(crate) use clusters::{Faces, Few, LEAF, Node, Shape, Trees, WIDE};
 pub use cuboid::{cuboid, vjp_cuboid};
 pub use detail::{Coarse, Detail};
+pub use edges::weld;
 pub use error::GeomError;
 pub use frame::{FileFrame, UpAxis};
 pub use landmark::Landmark;
