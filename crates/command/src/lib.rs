@@ -9,7 +9,7 @@ mod args;
 mod contours;
 mod detect;
 mod evaluate;
-mod guests;
+pub mod guests;
 mod learn;
 mod manual;
 mod programs;
