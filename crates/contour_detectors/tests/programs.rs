@@ -143,7 +143,8 @@ fn mistakes_are_shown() {
         let why = error(item);
         assert!(why.contains(says), "{item}: {why}");
     }
-    assert!(error("detector(\"net.onnx\")").contains("cannot read the network"));
+    let why = error("detector(\"net.onnx\")");
+    assert!(why.contains("net.onnx: the network"), "{why}");
 }
 
 #[test]
