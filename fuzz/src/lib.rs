@@ -20,7 +20,7 @@ use pcadlang_scene::geom::{FileFrame, UpAxis, gltf as gltf_file, obj as obj_file
 use pcadlang_scene::render::Camera;
 use pcadlang_scene::vision::features::Query;
 use pcadlang_scene::vision::keypoints::People;
-use pcadlang_scene::vision::{Forest, Limits as Pixels, Photo, depth, mask, npy, photo};
+use pcadlang_scene::vision::{Limits as Pixels, depth, mask, npy, photo};
 use pcadlang_syntax::diag::{IntoDiagnostic, SourceMap, render};
 use pcadlang_syntax::{parse, print, span::FileId};
 use pcadlang_workbench::bank::Bank;
@@ -375,30 +375,6 @@ pub fn network(bytes: &[u8]) {
             assert_eq!(outputs, Ok(network.output_shapes().len()));
         }
         Ok(_) => {}
-        Err(e) => assert!(!e.to_string().is_empty()),
-    }
-}
-
-/// Returns the picture to which forests are applied.
-fn looked_at() -> &'static Photo {
-    static PHOTO: OnceLock<Photo> = OnceLock::new();
-    let read = || {
-        photo::decode(include_bytes!("../../examples/images/table_lamp.png"), &Pixels::default())
-    };
-    PHOTO.get_or_init(|| read().unwrap_or_else(|e| panic!("{e}")).shrunk(48))
-}
-
-/// Tests a structured forest: one that was read gives a finite value for each pixel of a
-/// picture.
-pub fn forest(bytes: &[u8]) {
-    match Forest::read(bytes) {
-        Ok(forest) => {
-            let map = forest.map(looked_at(), 48);
-            assert_eq!(map.values.len(), map.width as usize * map.height as usize);
-            assert!(map.values.iter().all(|v| v.is_finite()));
-            let contours = map.contours(1.0);
-            assert!(contours.strength.iter().all(|s| (0.0..=1.0).contains(s)));
-        }
         Err(e) => assert!(!e.to_string().is_empty()),
     }
 }

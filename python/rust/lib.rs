@@ -41,6 +41,7 @@ mod _native {
 
     #[pymodule_init]
     fn init(m: &Bound<'_, PyModule>) -> PyResult<()> {
+        pcadlang_command::guests::register().map_err(super::errors::raised)?;
         m.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -4,9 +4,6 @@
 #[path = "../common/mod.rs"]
 mod common;
 #[allow(dead_code)]
-#[path = "../../crates/scene/src/vision/detect/forest/writer.rs"]
-mod forests;
-#[allow(dead_code)]
 #[path = "../../crates/detectors/src/nn/tests/writer.rs"]
 mod networks;
 #[path = "../../fuzz/src/lib.rs"]
@@ -52,7 +49,7 @@ macro_rules! targets {
     };
 }
 
-targets! { program_text program obj gltf rig image array camera trace bank checkpoint keypoints table network forest studio }
+targets! { program_text program obj gltf rig image array camera trace bank checkpoint keypoints table network studio }
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -244,10 +241,6 @@ fn seeds_of(target: &str) -> Vec<Vec<u8>> {
             "\u{1}x;ok\n1;true\n",
         ]),
         "network" => vec![networks::file(b"TFL3", &networks::small())],
-        "forest" => {
-            let text = forests::small().yaml();
-            vec![forests::gzip(text.as_bytes()), text.into_bytes()]
-        }
         _ => Vec::new(),
     }
 }
@@ -303,7 +296,6 @@ fn accepts_its_seeds(name: &str, target: Target) {
             "camera" => Camera::from_json(text()).is_ok(),
             "keypoints" => People::parse(seed).is_ok(),
             "network" => pcadlang_detectors::nn::Network::read(seed).is_ok(),
-            "forest" => pcadlang_scene::vision::Forest::read(seed).is_ok(),
             "checkpoint" => pcadlang_inference::Checkpoint::from_bytes(seed).is_ok(),
             _ => true,
         };

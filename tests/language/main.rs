@@ -3,9 +3,6 @@
 
 #[path = "../common/mod.rs"]
 mod common;
-#[allow(dead_code)]
-#[path = "../../crates/scene/src/vision/detect/forest/writer.rs"]
-mod forests;
 
 mod builtins;
 mod docs;

@@ -109,12 +109,6 @@ fn shipped_two_people() {
     same_of_picture("two_people.pcad", Some(48), &[SKIER], 40, 40);
 }
 
-#[test]
-#[ignore = "half a minute"]
-fn shipped_animal() {
-    same_of_picture("autorig.pcad", Some(48), &[SKIER], 20, 20);
-}
-
 /// A branch with its own choices, on which one computation stops depending when the
 /// parameters of a choice start to depend on it.
 #[test]

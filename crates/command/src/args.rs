@@ -330,9 +330,9 @@ pub struct Contours {
     /// --edges 512]
     #[arg(long, value_parser = clap::value_parser!(u32).range(8..=8192))]
     pub size: Option<u32>,
-    /// A contour detector to replace colour gradients: a structured forest (model.yml.gz)
-    /// or, if this build supports it, a network (.onnx). Options follow, as in a
-    /// program's `detector`: 'net.onnx, colours = "bgr", white = 255'
+    /// A contour detector to replace colour gradients, in builds with the feature
+    /// contour_detectors: a structured forest (model.yml.gz) or a network (.onnx). Options
+    /// follow, as in a program's `detector`: 'net.onnx, colours = "bgr", white = 255'
     #[arg(long, value_name = "FILE[,OPTION=VALUE…]")]
     pub edges: Option<String>,
 }

@@ -6,7 +6,7 @@ use pcadlang_report::pictures::png;
 use pcadlang_runs::edges;
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::files;
-use pcadlang_scene::vision::{FileDetector, GradientDetector};
+use pcadlang_scene::vision::{GradientDetector, MAP_SIZE, MOST_MAP_SIZE};
 
 /// Detects the contours of a photograph and writes them as a map.
 pub fn contours(a: &Contours) -> Result<(), Failure> {
@@ -19,15 +19,15 @@ pub fn contours(a: &Contours) -> Result<(), Failure> {
         Some(spec) => {
             let DetectorValue(detector) = edges::detector(spec)?;
             let detector = detector.ok_or_else(|| plain(format!("{spec} is not a detector")))?;
-            let size = a.size.unwrap_or(FileDetector::SIZE);
-            if size > FileDetector::MOST {
-                let most = FileDetector::MOST;
+            let size = a.size.unwrap_or(MAP_SIZE);
+            if size > MOST_MAP_SIZE {
                 return Err(plain(format!(
-                    "--size {size}: with --edges the longer side may be at most {most} pixels"
+                    "--size {size}: with --edges the longer side may be at most {MOST_MAP_SIZE} pixels"
                 )));
             }
-            let map = detector.map(&photo, size).map_err(|e| plain(format!("{spec}: {e}")))?;
-            detector.contours(&map, &photo, detector.sigma())
+            let map =
+                detector.map(&photo, size.max(1)).map_err(|e| plain(format!("{spec}: {e}")))?;
+            map.contours_of(&photo, detector.sigma())
         }
     };
     let picture = png(&map.to_image()).map_err(|e| plain(e.to_string()))?;

@@ -9,6 +9,7 @@ mod args;
 mod contours;
 mod detect;
 mod evaluate;
+pub mod guests;
 mod learn;
 mod manual;
 mod programs;
@@ -36,6 +37,9 @@ pub fn command(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             return u8::try_from(e.exit_code()).unwrap_or(2);
         }
     };
+    if let Err(e) = guests::register() {
+        return term::fail(e.into());
+    }
     let done = match cli.command {
         Command::Run(a) => run::run(&a),
         Command::Evaluate(a) => evaluate::evaluate(&a),

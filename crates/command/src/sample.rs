@@ -2,6 +2,7 @@
 //! et al. 2014.
 
 use super::args::Sample;
+use pcadlang_engine::lang::error::FaultKind;
 use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::Trace;
 use pcadlang_report::pictures::{contact_sheet, png, shaded};
@@ -19,6 +20,16 @@ pub fn sample(a: &Sample) -> Result<(), Failure> {
     for i in 0..a.n {
         let draws = scene::predictive(a.seed, u64::from(i));
         let mut trace = Trace::prior(Arc::clone(model.code()), model.limits().clone());
+        if i == 0 {
+            // What ends a run is an error here, too, and not a picture of what else there is.
+            for o in model.code().globals.values() {
+                if let Err(e) = trace.query(&[*o], draws)
+                    && e.kind == FaultKind::Other
+                {
+                    return Err(model.run_error(*e).into());
+                }
+            }
+        }
         let view = scene::view(&mut trace, draws, None);
         match view {
             Some(view) => pictures.push(shaded(&view.frame(a.size))),

@@ -32,9 +32,9 @@ pub struct Inputs {
     /// The camera, a JSON file; by default a view 4.4 units across at distance 8
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
-    /// A contour detector to replace colour gradients: a structured forest (model.yml.gz)
-    /// or, if this build supports it, a network (.onnx). Options follow, as in a
-    /// program's `detector`: 'net.onnx, colours = "bgr", white = 255'
+    /// A contour detector to replace colour gradients, in builds with the feature
+    /// contour_detectors: a structured forest (model.yml.gz) or a network (.onnx). Options
+    /// follow, as in a program's `detector`: 'net.onnx, colours = "bgr", white = 255'
     #[arg(long, value_name = "FILE[,OPTION=VALUE…]")]
     pub edges: Option<String>,
     /// Whom it is about

@@ -1,11 +1,11 @@
 //! The contours of a photograph, detected with other settings than the default.
 
 use super::observed::{DetectorSettings, DetectorValue};
-use super::{DETECTOR, IMAGE, ImageValue, native};
+use super::{IMAGE, ImageValue, native};
 use pcadlang_engine::lang::builtins::{Row, Type, arg, opt};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
-use pcadlang_scene::vision::FileDetector;
+use pcadlang_scene::vision::MOST_MAP_SIZE;
 
 pub(super) const TABLE: &[Row] = &[native(
     "edges",
@@ -37,7 +37,7 @@ pub(super) const TABLE: &[Row] = &[native(
         ),
         opt(
             "detector",
-            DETECTOR,
+            Type::Object("a detector"),
             "the run's",
             "The contour detector, `data d = detector(\"model.yml.gz\");`. By default that of the \
              run (`--edges`), or the built-in one, which uses colour gradients.",
@@ -57,7 +57,7 @@ pub(super) const TABLE: &[Row] = &[native(
         let (mut by, usual) = DetectorSettings::usual(detector);
         let (most, old_size, old_sigma) = match &by {
             DetectorSettings::Gradients(g) => (8192, g.size, g.sigma),
-            DetectorSettings::File { size, sigma, .. } => (FileDetector::MOST, *size, *sigma),
+            DetectorSettings::File { size, sigma, .. } => (MOST_MAP_SIZE, *size, *sigma),
         };
         let asked = if a.given(1) { a.int_in(1, 8, i64::from(most))? as u32 } else { old_size };
         let smooth = a.num_or(2, f64::from(old_sigma))?;

@@ -25,6 +25,8 @@ mod seeing;
 mod shapes;
 mod shared_tally;
 
+pub use bodies::AUTORIG;
+pub use data::DETECTOR;
 pub use inputs::{CAMERAS, DETECTOR_DEFAULT};
 pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};
 pub use observed::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue};
@@ -43,7 +45,6 @@ const AFFINE: Type = Type::Object("a placement");
 const CAMERA: Type = Type::Object("a camera");
 const VIEW: Type = Type::Object("a view");
 const IMAGE: Type = Type::Object("an image");
-const DETECTOR: Type = Type::Object("a detector");
 
 /// A pure function of this module.
 const fn native(
@@ -85,18 +86,29 @@ pub fn host() -> Host {
         compare_depths::TABLE,
     ];
     let host = Host::new().hook(Arc::new(inputs::Inputs));
-    tables.into_iter().flatten().fold(host, |host, row| {
-        let entry = Entry::from(row);
-        host.with(match examples::of(row) {
-            Some(text) => entry.example(text),
-            None => entry,
-        })
-    })
+    tables.into_iter().flatten().fold(host, |host, row| host.with(entry(row)))
+}
+
+/// A row of this module with its example. A crate apart takes a row that is declared here,
+/// gives it what it does, and registers it as `replacing()`.
+pub fn entry(row: &Row) -> Entry {
+    let entry = Entry::from(row);
+    match examples::of(row) {
+        Some(text) => entry.example(text),
+        None => entry,
+    }
+}
+
+/// The error of what a crate apart brings, in a build without it.
+fn left_out(what: &str, feature: &str) -> Fault {
+    let f = format!("{what}: this build was made without the feature `{feature}`");
+    Fault::new(FaultKind::Other, f)
+        .with_hint(format!("build it with `cargo install --path . --features {feature}`"))
 }
 
 /// Converts the error of a shape that cannot be made: numbers outside their domain reject
 /// a proposal, anything else ends the run.
-fn fault(e: GeomError) -> Fault {
+pub fn fault(e: GeomError) -> Fault {
     match e {
         GeomError::Domain(m) => Fault::domain(m),
         GeomError::Invalid(m) => Fault::new(FaultKind::Other, m),

@@ -6,9 +6,9 @@ use pcadlang_detectors::people::Person;
 use pcadlang_engine::lang::value::{Object, Value};
 use pcadlang_scene::vision::candidates::{Candidate, CandidateOptions};
 use pcadlang_scene::vision::{
-    Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood,
-    DepthMap, FileDetector, GradientDetector, Keypoints, Mask, MaskLikelihood, Photo, Region,
-    RegionOptions, SoftMap,
+    Chamfer, ChamferOptions, ContourDetector, ContourMap, ContourRatio, ContourRatioOptions,
+    DepthLikelihood, DepthMap, GradientDetector, Keypoints, MAP_SIZE, Mask, MaskLikelihood, Photo,
+    Region, RegionOptions, SoftMap,
 };
 use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -176,7 +176,7 @@ impl ImageValue {
                 let soft = self.soft.get((detector.clone(), *size), |_| {
                     file.map(photo, *size).map_err(|e| e.to_string())
                 })?;
-                Ok(file.contours(&soft, photo, *sigma))
+                Ok(soft.contours_of(photo, *sigma))
             }
         }
     }
@@ -193,7 +193,7 @@ impl ImageValue {
 /// A contour detector from a file, or the built-in one if there is no file. Clones share
 /// it.
 #[derive(Clone, Debug, Default)]
-pub struct DetectorValue(pub Option<Arc<FileDetector>>);
+pub struct DetectorValue(pub Option<Arc<dyn ContourDetector>>);
 
 impl PartialEq for DetectorValue {
     /// Whether both come from the same reading of a file, which may have changed in
@@ -238,7 +238,7 @@ impl DetectorSettings {
     pub fn usual(detector: Option<&DetectorValue>) -> (DetectorSettings, f32) {
         match detector.and_then(|d| d.0.as_ref().map(|file| (d, file))) {
             Some((d, file)) => {
-                let (detector, size, sigma) = (d.clone(), FileDetector::SIZE, file.sigma());
+                let (detector, size, sigma) = (d.clone(), MAP_SIZE, file.sigma());
                 (DetectorSettings::File { detector, size, sigma }, file.strength())
             }
             None => (DetectorSettings::Gradients(GradientDetector::default()), ImageValue::STRONG),

@@ -141,7 +141,7 @@ pub(super) fn smooth_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<
 }
 
 /// Returns, for each vertex, the first vertex at the same position.
-pub(super) fn weld(positions: &[Vec3]) -> Vec<u32> {
+pub fn weld(positions: &[Vec3]) -> Vec<u32> {
     let mut first: FxHashMap<[u32; 3], u32> = FxHashMap::default();
     let key = |p: &Vec3| [p.x, p.y, p.z].map(|x| (x + 0.0).to_bits());
     positions.iter().enumerate().map(|(i, p)| *first.entry(key(p)).or_insert(i as u32)).collect()

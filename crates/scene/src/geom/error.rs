@@ -16,7 +16,8 @@ impl GeomError {
         GeomError::Domain(message.into())
     }
 
-    pub(super) fn invalid(message: impl Into<String>) -> Self {
+    /// A mistake that ends the run.
+    pub fn invalid(message: impl Into<String>) -> Self {
         GeomError::Invalid(message.into())
     }
 }

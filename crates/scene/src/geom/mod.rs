@@ -27,6 +27,7 @@ mod sphere;
 pub use affine::Affine;
 pub use bounds::Bounds;
 pub use cuboid::{cuboid, vjp_cuboid};
+pub use edges::weld;
 pub use error::GeomError;
 pub use frame::{FileFrame, UpAxis};
 pub use landmark::Landmark;

@@ -3,15 +3,37 @@
 mod args;
 mod vjps;
 
-use super::{ARMATURE, ArmatureValue, SOLID, SolidValue, fault, incremental, native};
+use super::{ARMATURE, ArmatureValue, SOLID, SolidValue, fault, incremental, left_out, native};
 use args::{armature, pose, stops, stretches};
 use pcadlang_engine::lang::builtins::{Row, Type, arg, opt};
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_engine::lang::value::Value;
-use pcadlang_scene::geom::armature::{Posed, Rules, autorig};
+use pcadlang_scene::geom::armature::{Posed, Rules};
 use std::sync::Arc;
 
 const SECTION: &str = "Bodies";
+
+/// Rigging, which the crate `autorig` does.
+pub const AUTORIG: Row = native(
+    "autorig",
+    SECTION,
+    &[
+        arg("mesh", SOLID, "The mesh, as read by `data m: mesh`."),
+        opt(
+            "from",
+            Type::Str,
+            "\"groups\"",
+            "\"groups\": a joint for each object or group of the mesh, with its name; \
+             \"skeleton\": `root`, `bone_1`, … along the medial axis of a closed mesh.",
+        ),
+        opt("bones", Type::Int, "16", "The maximum number of joints of a skeleton, 1 to 256."),
+    ],
+    ARMATURE,
+    "An armature for a mesh without one: a tree with its root at the mesh's centre; its \
+     joints are landmarks of the skinned solid from `scene.skin`. The surface is smoothed. If \
+     it depends only on data it is computed once. Needs a build with the feature `autorig`.",
+    |_| Err(left_out("scene.autorig", "autorig")),
+);
 
 pub(super) const TABLE: &[Row] = &[
     incremental(
@@ -98,37 +120,5 @@ pub(super) const TABLE: &[Row] = &[
         },
     )
     .vjp(vjps::stretched),
-    native(
-        "autorig",
-        SECTION,
-        &[
-            arg("mesh", SOLID, "The mesh, as read by `data m: mesh`."),
-            opt(
-                "from",
-                Type::Str,
-                "\"groups\"",
-                "\"groups\": a joint for each object or group of the mesh, with its name; \
-                 \"skeleton\": `root`, `bone_1`, … along the medial axis of a closed mesh.",
-            ),
-            opt("bones", Type::Int, "16", "The maximum number of joints of a skeleton, 1 to 256."),
-        ],
-        ARMATURE,
-        "An armature for a mesh without one: a tree with its root at the mesh's centre; its \
-         joints are landmarks of the skinned solid from `scene.skin`. The surface is smoothed. If \
-         it depends only on data it is computed once.",
-        |a| {
-            let solid = a.object::<SolidValue>(0, "a solid")?;
-            let mesh = solid.0.to_mesh().map_err(fault)?;
-            let most = if a.given(2) { a.int_in(2, 1, autorig::MOST_BONES as i64)? as usize } else { 16 };
-            let made = match a.choice(1, &["groups", "skeleton"])? {
-                "skeleton" => autorig::by_skeleton(&mesh, most).map_err(fault),
-                _ => autorig::by_groups(&mesh).map_err(|e| {
-                    let one = mesh.topology.parts.windows(2).all(|p| p[0] == p[1]);
-                    let f = fault(e);
-                    if one { f.with_hint("for a mesh in one piece use `from = \"skeleton\"`") } else { f }
-                }),
-            };
-            made.map(|b| Value::object(ArmatureValue(Arc::new(b))))
-        },
-    ),
+    AUTORIG,
 ];

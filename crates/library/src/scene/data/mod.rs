@@ -4,6 +4,7 @@
 mod armature;
 mod options;
 
+use super::left_out;
 use super::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue, SolidValue};
 use pcadlang_engine::lang::builtins::data::{
     Beside, DataFormat, FILE, Literal, Options, kind, unreadable,
@@ -13,9 +14,7 @@ use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::geom::{FileFrame, GeomError, Solid, gltf, obj};
 use pcadlang_scene::vision::keypoints::{self, Keypoints, People};
-use pcadlang_scene::vision::{
-    ContourMap, FileDetector, Limits, VisionError, depth, mask, npy, photo,
-};
+use pcadlang_scene::vision::{ContourMap, Limits, VisionError, depth, mask, npy, photo};
 use std::sync::Arc;
 
 const SHAPE: &[Arg] = &[
@@ -61,6 +60,18 @@ const NETWORK: &[Arg] = &[
     opt("shows", Type::Str, "\"contours\"", "What the map shows, \"contours\" or \"objects\"."),
 ];
 
+/// Contour detectors from files, which the crate `contour_detectors` reads.
+pub const DETECTOR: Row = kind(
+    "detector",
+    NETWORK,
+    Type::Object("a detector"),
+    "A contour detector for photographs, for `scene.edges`: an OpenCV structured forest \
+     (`model.yml.gz`), or a network (`.onnx`), to which the options apply; files need a build \
+     with the feature `contour_detectors`. Without a file, the built-in detector. See \
+     `docs/howto/detectors.md`.",
+    || Arc::new(NoFiles),
+);
+
 pub(super) const TABLE: &[Row] = &[
     kind(
         "image",
@@ -86,15 +97,7 @@ pub(super) const TABLE: &[Row] = &[
         "A depth map: `.npy`, or a 16-bit PNG in thousandths of a scene unit.",
         || Arc::new(Plain(depth)),
     ),
-    kind(
-        "detector",
-        NETWORK,
-        Type::Object("a detector"),
-        "A contour detector for photographs, for `scene.edges`: an OpenCV structured forest \
-         (`model.yml.gz`), or a network (`.onnx`; only in builds with the feature `onnx`), to \
-         which the options apply; without a file, the built-in detector. See `docs/howto/detectors.md`.",
-        || Arc::new(DetectorFile),
-    ),
+    DETECTOR,
     kind(
         "armature",
         SHAPE,
@@ -160,34 +163,17 @@ fn depth(bytes: &[u8], limits: &Limits) -> Result<Value, VisionError> {
     depth::decode(bytes, scale, limits).map(|d| Value::object(DepthValue::new(d)))
 }
 
-/// A contour detector.
+/// Contour detectors of builds that read none from files.
 #[derive(Debug)]
-struct DetectorFile;
+struct NoFiles;
 
-impl DataFormat for DetectorFile {
-    fn load(
-        &self,
-        file: &str,
-        bytes: &[u8],
-        options: &Options,
-        _: &Beside,
-    ) -> Result<Value, Fault> {
-        let network = options::network(options).map_err(|why| unreadable(file, &why))?;
-        FileDetector::read(bytes, &network)
-            .map(|d| Value::object(DetectorValue(Some(d.into()))))
-            .map_err(|e| unreadable(file, &e.to_string()))
+impl DataFormat for NoFiles {
+    fn load(&self, file: &str, _: &[u8], _: &Options, _: &Beside) -> Result<Value, Fault> {
+        Err(left_out(&format!("{file}: contour detectors from files"), "contour_detectors"))
     }
 
     fn without_file(&self) -> Option<Value> {
         Some(Value::object(DetectorValue::default()))
-    }
-
-    fn check_option(&self, name: &str, value: &Literal) -> Result<(), String> {
-        options::network(&Options::single(name, value.clone())).map(|_| ())
-    }
-
-    fn example(&self) -> Option<&'static str> {
-        Some("detector(\"network.onnx\", colours = \"bgr\", white = 255, logits = true)")
     }
 }
 

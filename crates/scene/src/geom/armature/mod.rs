@@ -1,7 +1,6 @@
 //! Armatures: trees of joints that move a mesh, as in Kulkarni et al. 2014, section
 //! 2.1.2.
 
-pub mod autorig;
 mod body;
 mod kinematics;
 mod morph;

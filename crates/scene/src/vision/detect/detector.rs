@@ -1,24 +1,37 @@
-//! Contour detectors. A gradient detector is built in; detectors from files
-//! ([`crate::vision::FileDetector`]: structured forests, networks) and others can replace it
-//! through the trait.
+//! Contour detectors. A gradient detector is built in; others, such as those of
+//! `crates/contour_detectors`, can replace it through the trait.
 
 use crate::vision::VisionError;
 use crate::vision::detect::gradient::colour_gradient;
 use crate::vision::detect::nms::{EdgePoint, hysteresis, suppress};
+use crate::vision::detect::soft_map::SoftMap;
 use crate::vision::pictures::color::linear_to_labs;
 use crate::vision::pictures::contour_map::ContourMap;
 use crate::vision::pictures::photo::Photo;
 use crate::vision::pictures::resize::fitted;
+use std::fmt::Debug;
 
-/// Detects contours in photographs. The map is a deterministic function of the
-/// photograph, bit by bit.
-pub trait ContourDetector {
-    /// Returns the contours of a photograph. The map may be smaller than the photograph
-    /// but has its aspect ratio.
+/// The default longer side of the picture that a [`ContourDetector`] works on, pixels.
+pub const MAP_SIZE: u32 = 512;
+/// The maximum longer side of the picture that a [`ContourDetector`] works on, pixels.
+pub const MOST_MAP_SIZE: u32 = 2048;
+
+/// Finds contours in photographs in place of the built-in detector. It computes a map of a
+/// photograph, which is slow; [`SoftMap::contours_of`] are then found in the map, which is
+/// fast. The map is a deterministic function of the photograph.
+pub trait ContourDetector: Debug + Send + Sync {
+    /// Computes the map of a photograph at a longer side of at most `size` pixels, or at the
+    /// detector's own size.
     ///
     /// # Errors
     /// If the detector fails on the photograph, as a network may while it runs.
-    fn detect(&self, photo: &Photo) -> Result<ContourMap, VisionError>;
+    fn map(&self, photo: &Photo, size: u32) -> Result<SoftMap, VisionError>;
+
+    /// The default smoothing of its maps, pixels of the map.
+    fn sigma(&self) -> f32;
+
+    /// The default threshold on the strength of contours, in 0..=1.
+    fn strength(&self) -> f32;
 }
 
 /// Contours as maxima of the colour gradient in L*a*b*. It does not recognise objects:
@@ -54,13 +67,6 @@ const COMMON_REFERENCE: f32 = 4.0;
 /// Weight of colour relative to lightness: shading and texture change lightness, other
 /// objects change colour.
 const COLOUR_WEIGHT: f32 = 2.0;
-
-impl ContourDetector for GradientDetector {
-    /// See [`contours`](GradientDetector::contours), which never fails.
-    fn detect(&self, photo: &Photo) -> Result<ContourMap, VisionError> {
-        Ok(self.contours(photo))
-    }
-}
 
 impl GradientDetector {
     /// Returns the contours of a photograph.

@@ -43,7 +43,7 @@ fn kernels(sigma: f32) -> (Vec<f64>, Vec<f64>) {
 
 /// Returns position `i` of a line of `n`, mirrored at its ends (the end pixels count
 /// twice).
-pub(in crate::vision) fn mirrored(i: i64, n: i64) -> usize {
+pub fn mirrored(i: i64, n: i64) -> usize {
     let m = i.rem_euclid(2 * n);
     (if m < n { m } else { 2 * n - 1 - m }) as usize
 }

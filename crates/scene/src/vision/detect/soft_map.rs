@@ -5,6 +5,8 @@
 use crate::vision::detect::gradient::{Gradient, colour_gradient, smoothed};
 use crate::vision::detect::nms::{EdgePoint, suppress};
 use crate::vision::pictures::contour_map::ContourMap;
+use crate::vision::pictures::photo::Photo;
+use crate::vision::pictures::resize::fitted;
 
 /// What a map shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -60,6 +62,14 @@ impl SoftMap {
                 ContourMap::from_points(width, height, &points, |m| m / step)
             }
         }
+    }
+
+    /// Returns the [`contours`](SoftMap::contours) of the map of a photograph, scaled to the
+    /// photograph's aspect ratio.
+    pub fn contours_of(&self, photo: &Photo, sigma: f32) -> ContourMap {
+        let found = self.contours(sigma);
+        let shape = fitted(photo.width(), photo.height(), self.width.max(self.height));
+        if shape == (self.width, self.height) { found } else { found.scaled_to(shape.0, shape.1) }
     }
 
     /// Returns the largest value within a pixel's distance: smoothing moves ridges a

@@ -1,7 +1,7 @@
 //! Tests of networks written byte by byte.
 
 use super::*;
-use crate::vision::{ContourDetector, FileDetector};
+use crate::read;
 use image::{Rgb, RgbImage};
 use writer::{Dim, Graph, floats, node};
 
@@ -208,11 +208,11 @@ fn objects_and_contours_become_contour_maps_in_the_shape_of_the_photograph() {
     // photograph.
     let fixed = weighted(3, [Dim::Of(64), Dim::Of(64)], &[1.0, 0.0, 0.0], "Identity");
     let objects = NetworkOptions { shows: Shows::Objects, ..NetworkOptions::default() };
-    let detector = FileDetector::read(&fixed.file(), &objects).unwrap();
+    let detector = read(&fixed.file(), &objects).unwrap();
     let photo = photo(128, 64);
     let soft = detector.map(&photo, 512).unwrap();
     assert_eq!((soft.width, soft.height), (64, 64));
-    let map = detector.detect(&photo).unwrap();
+    let map = soft.contours_of(&photo, detector.sigma());
     assert_eq!((map.width, map.height), (64, 32));
     assert!(map.len() > 40);
     for k in 0..map.len() {
@@ -222,10 +222,8 @@ fn objects_and_contours_become_contour_maps_in_the_shape_of_the_photograph() {
         assert!(((map.tx[k] * x + map.ty[k] * y) / r).abs() < 0.3);
     }
     // The options decide what a map shows.
-    let contours = FileDetector::read(&fixed.file(), &NetworkOptions::default())
-        .unwrap()
-        .detect(&photo)
-        .unwrap();
+    let detector = read(&fixed.file(), &NetworkOptions::default()).unwrap();
+    let contours = detector.map(&photo, 512).unwrap().contours_of(&photo, detector.sigma());
     assert_ne!(contours, map);
 }
 

@@ -1,9 +1,9 @@
 //! Skin weights: mixtures of joints, and weights by distance to bones.
 
-use super::Bone;
-use super::near::to_segment;
-use crate::geom::armature::{Influence, MOST_WEIGHTS};
+use crate::near::to_segment;
+use crate::rigging::Bone;
 use glam::Vec3;
+use pcadlang_scene::geom::armature::{Influence, MOST_WEIGHTS};
 
 /// Joints with unnormalised weights.
 #[derive(Clone, Debug, Default)]

@@ -30,7 +30,7 @@ pub(super) struct Grid {
 impl Grid {
     /// Samples the interior of a mesh; `None` if no cell is inside.
     pub fn inside(positions: &[Vec3], triangles: &[[u32; 3]]) -> Option<Grid> {
-        let bounds = crate::geom::Bounds::around(positions.iter().map(|p| p.as_dvec3()))?;
+        let bounds = pcadlang_scene::geom::Bounds::around(positions.iter().map(|p| p.as_dvec3()))?;
         let cell = bounds.size().max_element() / LONGEST;
         if !(cell > 0.0 && cell.is_finite()) {
             return None;
@@ -270,7 +270,7 @@ impl Grid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::{Affine, Solid, sphere};
+    use pcadlang_scene::geom::{Affine, Solid, sphere};
     use std::sync::Arc;
 
     #[test]

@@ -3,7 +3,7 @@
 //! smaller than the picture, and smoothed lightly or strongly.
 
 use super::options::ForestOptions;
-use crate::vision::detect::gradient::mirrored;
+use pcadlang_scene::vision::gradient::mirrored;
 
 /// A channel: width, height, and its values in row-major order.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! Distances from points to a surface, and an inside test.
 
-use crate::geom::Bounds;
 use glam::DVec3;
+use pcadlang_scene::geom::Bounds;
 
 /// The triangles of one part.
 pub(super) struct Surface {
@@ -92,7 +92,7 @@ pub(super) fn to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::cuboid;
+    use pcadlang_scene::geom::cuboid;
 
     #[test]
     fn distances_from_a_cube() {

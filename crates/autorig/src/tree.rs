@@ -1,8 +1,8 @@
 //! Bones from curves: the curves are smoothed, split at branches and bends, and
 //! simplified to the allowed number of bones.
 
-use super::Bone;
-use super::skeleton::Node;
+use crate::rigging::Bone;
+use crate::skeleton::Node;
 use glam::DVec3;
 
 /// The number of smoothing passes; each replaces a point by the mean of it and its
@@ -150,7 +150,7 @@ fn simplified(points: &[DVec3], tolerance: f64) -> Vec<DVec3> {
     let mut open = vec![(0, points.len() - 1)];
     (keep[0], keep[points.len() - 1]) = (true, true);
     while let Some((a, b)) = open.pop() {
-        let far = |k: usize| super::near::to_segment(points[k], points[a], points[b]);
+        let far = |k: usize| crate::near::to_segment(points[k], points[a], points[b]);
         let worst =
             (a + 1..b).fold((0, tolerance), |w, k| if far(k) > w.1 { (k, far(k)) } else { w });
         if worst.0 > 0 {

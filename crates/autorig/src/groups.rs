@@ -1,11 +1,11 @@
 //! Joints from the groups of a mesh: which groups touch, where, and the tree they form.
 
-use super::near::Surface;
-use super::skin::Mix;
-use super::{Bone, MOST_GROUPED_TRIANGLES, MOST_GROUPS};
-use crate::geom::armature::Influence;
-use crate::geom::{Bounds, GeomError, Mesh};
+use crate::near::Surface;
+use crate::rigging::{Bone, MOST_GROUPED_TRIANGLES, MOST_GROUPS};
+use crate::skin::Mix;
 use glam::{DVec3, Vec3};
+use pcadlang_scene::geom::armature::Influence;
+use pcadlang_scene::geom::{Bounds, GeomError, Mesh};
 use std::collections::BTreeSet;
 
 /// Groups are neighbours if they are no farther apart than this fraction of the diagonal

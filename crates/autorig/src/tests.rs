@@ -1,8 +1,9 @@
 //! Tests of armatures for boxes in a row and for bodies with arms.
 
-use super::*;
-use crate::geom::armature::{JointPose, Rules};
-use crate::geom::{Affine, Solid, cuboid, obj, sphere};
+use crate::rigging::*;
+use glam::{DVec3, Vec3};
+use pcadlang_scene::geom::armature::{Armature, JointPose, Rules};
+use pcadlang_scene::geom::{Affine, GeomError, Mesh, Solid, cuboid, obj, sphere};
 use std::fmt::Write;
 use std::sync::Arc;
 
@@ -32,7 +33,7 @@ fn chain() -> Mesh {
     boxes(&[("hand", x(4.0), size), ("upper", x(0.0), size), ("fore", x(2.0), size)])
 }
 
-fn joint<'a>(a: &'a Armature, name: &str) -> &'a crate::geom::armature::Joint {
+fn joint<'a>(a: &'a Armature, name: &str) -> &'a pcadlang_scene::geom::armature::Joint {
     &a.rig().joints()[a.rig().find(name).unwrap()]
 }
 

@@ -1,12 +1,18 @@
-//! Contour detectors from files: in programs, by `--edges`, and how they are recorded.
+//! Contour detectors from files, in programs.
 
-use crate::common::folder::{Folder, disc, png};
-use crate::forests;
-use pcadlang::{Model, Program};
+#[allow(dead_code)]
+#[path = "../src/forest/writer.rs"]
+mod forests;
+
+use image::{GrayImage, ImageFormat, Luma};
+use pcadlang_contour_detectors::{NetworkOptions, host, read};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::Draws;
 use pcadlang_library::scene::{DetectorValue, ImageValue};
-use pcadlang_scene::vision::{FileDetector, NetworkOptions, Photo};
+use pcadlang_library::{Model, Program, standard};
+use pcadlang_scene::vision::Photo;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
 
 const PROGRAM: &str = "
 include \"std/scene.pcad\" as scene;
@@ -19,28 +25,30 @@ let by_none = scene.edges(photo, detector = none);
 let smoother = scene.edges(photo, detector = trees, smooth = 4, strength = 0.05);
 ";
 
-/// A program whose comparator uses the photograph without preprocessing.
-const RUN: &str = "
-include \"std/scene.pcad\" as scene;
-data photo: image;
-assume r ~ uniform(0.5, 1.5);
-let view = scene.render(scene.sphere(r));
-observe scene.contour(view, size = 32) = photo as picture;
-infer { repeat 20 { drift(@r); collect r; } }
-";
+/// A picture of a disc.
+fn ball() -> Vec<u8> {
+    let disc = GrayImage::from_fn(96, 96, |x, y| {
+        Luma([if (x as f32 - 47.5).hypot(y as f32 - 47.5) < 24.0 { 255 } else { 0 }])
+    });
+    let mut bytes = Cursor::new(Vec::new());
+    disc.write_to(&mut bytes, ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
 
-fn folder(name: &str) -> Folder {
-    let f = Folder::new(name);
-    f.write("ball.png", png(disc(96, 96, 48.0, 48.0, 24.0)));
-    f.write("model.yml", forests::small().yaml());
-    f.write("model.yml.gz", forests::gzip(forests::small().yaml().as_bytes()));
-    f.write("run.pcad", RUN);
+fn folder(name: &str) -> PathBuf {
+    let f = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::create_dir_all(&f).unwrap();
+    let yaml = forests::small().yaml();
+    std::fs::write(f.join("ball.png"), ball()).unwrap();
+    std::fs::write(f.join("model.yml.gz"), forests::gzip(yaml.as_bytes())).unwrap();
+    std::fs::write(f.join("model.yml"), yaml).unwrap();
     f
 }
 
-fn open(f: &Folder, text: &str) -> Program {
-    f.write("p.pcad", text);
-    Program::open(f.path().join("p.pcad").to_str().unwrap()).unwrap_or_else(|e| panic!("{e}"))
+fn open(f: &Path, text: &str) -> Program {
+    std::fs::write(f.join("p.pcad"), text).unwrap();
+    let program = Program::open(f.join("p.pcad").to_str().unwrap());
+    program.and_then(|p| p.host(&host())).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Returns the number of contour points of a program's value, and the sum of their
@@ -57,8 +65,8 @@ fn seen(image: &Value) -> (usize, f32) {
 }
 
 fn forest() -> DetectorValue {
-    let read = FileDetector::read(forests::small().yaml().as_bytes(), &NetworkOptions::default());
-    DetectorValue(Some(read.unwrap().into()))
+    let read = read(forests::small().yaml().as_bytes(), &NetworkOptions::default());
+    DetectorValue(Some(read.unwrap()))
 }
 
 #[test]
@@ -74,7 +82,8 @@ fn programs_name_their_detector() {
     assert!(plain == by_none && plain != by_trees && by_trees != smoother);
     // Another file is another input, with another hash.
     let hash = model.data_hash().to_owned();
-    f.write("model.yml", forests::small().yaml().replace("stride: 2", "stride: 4"));
+    let other = forests::small().yaml().replace("stride: 2", "stride: 4");
+    std::fs::write(f.join("model.yml"), other).unwrap();
     let other = open(&f, PROGRAM).compile().unwrap_or_else(|e| panic!("{e}"));
     assert_ne!(other.data_hash(), hash);
     assert_ne!(contours(&other, "by_trees"), by_trees);
@@ -94,11 +103,7 @@ fn a_run_has_a_detector_where_the_program_names_none() {
     // The photograph itself, and one given by a host; the given value does not change
     // once its contours have been computed.
     assert_eq!(contours(&chosen, "photo"), by_trees);
-    let grey = pcadlang_scene::vision::photo::decode(
-        &png(disc(96, 96, 48.0, 48.0, 24.0)),
-        &Default::default(),
-    )
-    .unwrap();
+    let grey = pcadlang_scene::vision::photo::decode(&ball(), &Default::default()).unwrap();
     let given = Value::object(ImageValue::photo(Photo::from_rgb(grey.rgb().clone()).unwrap()));
     let before = seen(&given);
     let model =
@@ -114,8 +119,9 @@ fn mistakes_are_shown() {
         let text = format!("data d = {item};\nlet n = d;\n");
         open(&f, &text).compile().map(|_| ()).unwrap_err().to_string()
     };
-    f.write("cut.yml.gz", &forests::gzip(forests::small().yaml().as_bytes())[..300]);
-    f.write("net.onnx", b"\x08\x08:\x02\x12\x00");
+    let packed = forests::gzip(forests::small().yaml().as_bytes());
+    std::fs::write(f.join("cut.yml.gz"), &packed[..300]).unwrap();
+    std::fs::write(f.join("net.onnx"), b"\x08\x08:\x02\x12\x00").unwrap();
     for (item, says) in [
         ("detector(\"cut.yml.gz\")", "cut.yml.gz: line"),
         ("detector(\"ball.png\")", "neither a structured forest"),
@@ -137,49 +143,26 @@ fn mistakes_are_shown() {
         let why = error(item);
         assert!(why.contains(says), "{item}: {why}");
     }
-    if cfg!(not(feature = "onnx")) {
-        assert!(error("detector(\"net.onnx\")").contains("--features onnx"));
-    }
+    let why = error("detector(\"net.onnx\")");
+    assert!(why.contains("net.onnx: the network"), "{why}");
 }
 
 #[test]
-fn the_command_takes_a_detector() {
-    let f = folder("detectors_command");
-    f.succeeds(&["contours", "ball.png", "-o", "plain.png"]);
-    let said =
-        f.succeeds(&["contours", "ball.png", "-o", "trees.png", "--edges", "model.yml.gz"]).out;
-    assert!(said.contains("contour points in 96 x 96 pixels"), "{said}");
-    assert_ne!(
-        std::fs::read(f.path().join("plain.png")).unwrap(),
-        std::fs::read(f.path().join("trees.png")).unwrap()
-    );
-    let run = ["run", "run.pcad", "--observe", "ball.png", "--chains", "1", "--quiet"];
-    f.succeeds(&[&run[..], &["--out", "a"]].concat());
-    f.succeeds(&[&run[..], &["--out", "b", "--edges", "model.yml.gz"]].concat());
-    f.succeeds(&[&run[..], &["--out", "c", "--edges", "model.yml"]].concat());
-    let record = |name: &str| {
-        serde_json::from_str::<serde_json::Value>(&f.read(&format!("{name}/run.json"))).unwrap()
-    };
-    // Times are on lines that begin with `#`.
-    let draws = |name: &str| {
-        let text = f.read(&format!("{name}/chain-1.csv"));
-        text.lines().filter(|l| !l.starts_with('#')).map(str::to_owned).collect::<Vec<_>>()
-    };
-    assert_eq!((record("a").get("edges"), &record("b")["edges"]), (None, &"model.yml.gz".into()));
-    assert_ne!(record("a")["inputs_hash"], record("b")["inputs_hash"]);
-    assert_ne!(draws("a"), draws("b"));
-    assert_eq!(draws("b"), draws("c"), "the same forest, packed and not");
-    f.refuses(
-        &[&run[..], &["--out", "d", "--edges", "model.yml, colours = 3"]].concat(),
-        "must be \"rgb\" or \"bgr\"",
-    );
-    f.refuses(
-        &[&run[..], &["--out", "d", "--edges", "model.yml, bgr"]].concat(),
-        "give options by name",
-    );
-    f.refuses(
-        &[&run[..], &["--out", "d", "--edges", "model.yml, bgr); data e = csv(\"x\""]].concat(),
-        "options of a detector",
-    );
-    f.refuses(&["contours", "ball.png", "--edges", "model.yml", "--size", "5000"], "at most 2048");
+fn its_example_runs() {
+    let f = folder("detectors_example");
+    let table = host().table(&standard::table()).unwrap();
+    let example = table.get(table.find("", "detector").unwrap()).example.clone().unwrap();
+    let model = open(&f, &format!("include \"std/scene.pcad\" as scene;\n{example}\n"));
+    assert!(contours(&model.compile().unwrap_or_else(|e| panic!("{e}")), "found").0 > 15);
+}
+
+/// Writes the seeds to the folder that `fuzz/seeds.sh` sets.
+#[test]
+#[ignore = "writes files: see fuzz/seeds.sh"]
+fn write_seeds() {
+    let Some(to) = std::env::var_os("SEEDS").map(|f| Path::new(&f).join("forest")) else { return };
+    std::fs::create_dir_all(&to).unwrap();
+    let text = forests::small().yaml();
+    std::fs::write(to.join("seed-0"), forests::gzip(text.as_bytes())).unwrap();
+    std::fs::write(to.join("seed-1"), text).unwrap();
 }

@@ -3,7 +3,7 @@
 //! All paths come from one tree of cheapest paths to the root, so paths that join never
 //! separate again.
 
-use super::voxels::Grid;
+use crate::voxels::Grid;
 use glam::DVec3;
 
 /// A path covers the cells within this multiple of its clearance plus a few cells;

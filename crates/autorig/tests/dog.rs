@@ -1,15 +1,15 @@
 //! The shipped animal: this test makes its mesh, gives it an armature in both ways, and
 //! checks that `autorig.pcad` draws it.
 //!
-//! `REGENERATE=1 cargo test --release --test scene -- autorig::` rewrites
+//! `REGENERATE=1 cargo test --release -p pcadlang-autorig --test dog` rewrites
 //! `programs/data/dog.obj`.
 
-use crate::common::folder::Folder;
 use glam::DVec3;
-use pcadlang_library::shipped;
-use pcadlang_scene::geom::armature::autorig;
+use pcadlang_engine::trace::Draws;
+use pcadlang_inference::RunOptions;
+use pcadlang_library::scene::ArmatureValue;
+use pcadlang_library::{Program, shipped, standard};
 use pcadlang_scene::geom::obj;
-use std::collections::BTreeSet;
 use std::fmt::Write;
 
 const SIDES: usize = 10;
@@ -41,8 +41,9 @@ fn limbs() -> Vec<Limb> {
 
 /// Returns an OBJ file with a closed capsule around each limb.
 fn dog() -> String {
-    let mut s =
-        String::from("# A dog of capsules, made by tests/scene/autorig.rs. MIT OR Apache-2.0.\n");
+    let mut s = String::from(
+        "# A dog of capsules, made by crates/autorig/tests/dog.rs. MIT OR Apache-2.0.\n",
+    );
     let mut first = 1;
     for Limb(name, a, ra, b, rb) in limbs() {
         let _ = writeln!(s, "g {name}");
@@ -94,14 +95,14 @@ fn dog() -> String {
 fn the_shipped_animal_is_the_one_made_here() {
     let made = dog();
     if std::env::var_os("REGENERATE").is_some() {
-        std::fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/programs/data/dog.obj"), &made)
+        std::fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs/data/dog.obj"), &made)
             .unwrap();
         return;
     }
     assert!(made.len() < 60_000);
     assert!(
         shipped::file("data/dog.obj") == Some(&made),
-        "programs/data/dog.obj: REGENERATE=1 cargo test --release --test scene -- autorig::"
+        "programs/data/dog.obj: REGENERATE=1 cargo test --release -p pcadlang-autorig --test dog"
     );
     let mesh = obj::load(made.as_bytes()).unwrap();
     for t in &mesh.topology.triangles {
@@ -115,7 +116,7 @@ fn the_shipped_animal_is_the_one_made_here() {
 #[test]
 fn its_groups_become_its_limbs() {
     let mesh = obj::load(dog().as_bytes()).unwrap();
-    let body = autorig::by_groups(&mesh).unwrap();
+    let body = pcadlang_autorig::by_groups(&mesh).unwrap();
     let joints = body.rig().joints();
     let parent =
         |name: &str| joints[body.rig().find(name).unwrap()].parent.map_or("", |p| &*joints[p].name);
@@ -142,7 +143,7 @@ fn its_groups_become_its_limbs() {
 #[test]
 fn its_skeleton_reaches_its_ends() {
     let mesh = obj::load(dog().as_bytes()).unwrap();
-    let body = autorig::by_skeleton(&mesh, 16).unwrap();
+    let body = pcadlang_autorig::by_skeleton(&mesh, 16).unwrap();
     let joints = body.rig().joints();
     assert!((8..=16).contains(&joints.len()), "{}", joints.len());
     for name in ["head", "tail_2", "fore_lower_l", "fore_lower_r", "hind_lower_l", "hind_lower_r"] {
@@ -153,50 +154,78 @@ fn its_skeleton_reaches_its_ends() {
     }
 }
 
+/// Opens a program with `scene.autorig`.
+fn open(path: &str) -> Program {
+    Program::open(path)
+        .and_then(|p| p.host(&pcadlang_autorig::host()))
+        .unwrap_or_else(|e| panic!("{e}"))
+}
+
+const PHOTO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/images/skier.jpg");
+
 #[test]
 fn the_shipped_program_draws_it_both_ways() {
-    let f = Folder::new("autorig");
-    let mut pictures = BTreeSet::new();
-    for from in ["groups", "skeleton"] {
-        let set = format!("from={from}");
-        f.succeeds(&[
-            "sample",
-            "autorig.pcad",
-            "--set",
-            &set,
-            "-n",
-            "2",
-            "--size",
-            "64",
-            "--out",
-            "sheet.png",
-        ]);
-        pictures.insert(std::fs::read(f.path().join("sheet.png")).unwrap());
-    }
-    assert_eq!(pictures.len(), 2);
+    let joints = |from: &str| {
+        let program = open("autorig.pcad").set("from", from).observe_file("photo", PHOTO).unwrap();
+        let mut trace =
+            program.compile().and_then(|m| m.simulate(1, 0)).unwrap_or_else(|e| panic!("{e}"));
+        assert!(trace.log_joint().is_finite());
+        let body = trace.global("body", Draws::default()).unwrap().unwrap();
+        body.downcast::<ArmatureValue>().unwrap().0.rig().joints().len()
+    };
+    assert_ne!(joints("groups"), joints("skeleton"));
+}
+
+#[test]
+fn its_example_runs() {
+    let table = pcadlang_autorig::host().table(&standard::table()).unwrap();
+    let example = table.get(table.find("scene", "autorig").unwrap()).example.clone().unwrap();
+    let folder = concat!(env!("CARGO_TARGET_TMPDIR"), "/autorig_example");
+    std::fs::create_dir_all(format!("{folder}/data")).unwrap();
+    std::fs::write(format!("{folder}/data/dog.obj"), dog()).unwrap();
+    let path = format!("{folder}/p.pcad");
+    std::fs::write(&path, format!("include \"std/scene.pcad\" as scene;\n{example}\n")).unwrap();
+    let model = open(&path).compile().unwrap_or_else(|e| panic!("{e}"));
+    let mut trace = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(trace.global("n", Draws::default()).unwrap().unwrap().to_string(), "14");
+}
+
+/// Incremental updates and full re-execution give bit-identical chains.
+#[test]
+#[ignore = "half a minute"]
+fn increments_are_exact() {
+    let chains = |incremental: bool| {
+        let program = open("autorig.pcad").set("size", "48").observe_file("photo", PHOTO).unwrap();
+        let (steps, warmup) = (Some(20), Some(20));
+        let options = RunOptions { seed: 5, steps, warmup, incremental, ..RunOptions::default() };
+        let drawn = program.compile().and_then(|m| m.run(&options, 2, 2));
+        let bits = |xs: Vec<f64>| xs.into_iter().map(f64::to_bits).collect::<Vec<_>>();
+        let scalars = drawn.unwrap_or_else(|e| panic!("{e}")).scalars();
+        scalars.into_iter().map(|(name, xs)| (name, bits(xs))).collect::<Vec<_>>()
+    };
+    assert_eq!(chains(true), chains(false));
 }
 
 #[test]
 fn meshes_that_cannot_be_rigged_are_named_with_what_can_be_done() {
-    let f = Folder::new("autorig_errors");
-    f.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").write(
-        "p.pcad",
+    let folder = concat!(env!("CARGO_TARGET_TMPDIR"), "/autorig_errors");
+    std::fs::create_dir_all(folder).unwrap();
+    std::fs::write(format!("{folder}/flat.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let path = format!("{folder}/p.pcad");
+    std::fs::write(
+        &path,
         "include \"std/scene.pcad\" as scene; param from: string = \"groups\"; data m: mesh = mesh(\"flat.obj\");\n\
          assume x ~ normal(0, 1); observe normal(x, 1) = len(scene.autorig(m, from = from).joints);",
-    );
-    let run = |from: &str, says: &str| {
-        let set = format!("from={from}");
-        f.refuses(
-            &[
-                "run", "p.pcad", "--set", &set, "--steps", "5", "--warmup", "5", "--chains", "1",
-                "--quiet",
-            ],
-            says,
-        );
-    };
-    run("groups", "needs 2 to 256 groups in the mesh; it has 1");
-    let d = f.run(&["run", "p.pcad", "--quiet"]);
-    assert!(d.err.contains("hint: for a mesh in one piece use `from = \"skeleton\"`"), "{}", d.err);
-    run("skeleton", "a skeleton needs a closed mesh; this one has 3 open edges");
-    run("skin", "one of \"groups\", \"skeleton\"");
+    )
+    .unwrap();
+    for (from, says) in [
+        ("groups", "needs 2 to 256 groups in the mesh; it has 1"),
+        ("groups", "hint: for a mesh in one piece use `from = \"skeleton\"`"),
+        ("skeleton", "a skeleton needs a closed mesh; this one has 3 open edges"),
+        ("skin", "one of \"groups\", \"skeleton\""),
+    ] {
+        let done = open(&path).set("from", from).compile().and_then(|m| m.simulate(1, 0));
+        let error = done.map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(says), "{from}: {error}");
+    }
 }

@@ -6,11 +6,9 @@
 #[cfg(test)]
 mod tests;
 
-use crate::vision::VisionError;
-use crate::vision::detect::network_options::{NetworkOptions, Output};
-use crate::vision::detect::soft_map::{Shows, SoftMap};
-use crate::vision::pictures::photo::Photo;
-use crate::vision::pictures::resize::fitted;
+use crate::options::{NetworkOptions, Output};
+use pcadlang_scene::vision::resize::fitted;
+use pcadlang_scene::vision::{ContourDetector, Photo, Shows, SoftMap, VisionError};
 use rten::{DataType, Dimension, Model, NodeId, Value, ValueType};
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -97,18 +95,46 @@ impl Network {
         Ok(Network { model, input, takes, output, called, options: options.clone() })
     }
 
-    /// The meaning of its map.
-    pub fn shows(&self) -> Shows {
-        self.options.shows
+    fn unfit(&self, why: &str) -> VisionError {
+        wrong(format!("the output `{}` {why}", self.called))
     }
 
+    /// Converts the photograph to the network's input format.
+    fn picture(&self, photo: &Photo, width: u32, height: u32) -> Result<Value, VisionError> {
+        let NetworkOptions { bgr, white, mean, spread, .. } = self.options;
+        let mut rgb = photo.srgb(width, height);
+        for p in &mut rgb {
+            if bgr {
+                p.swap(0, 2);
+            }
+            if self.takes.channels == 1 {
+                let [red, blue] = if bgr { [p[2], p[0]] } else { [p[0], p[2]] };
+                // Luma of Rec. 601, which most grey pictures use.
+                *p = [0.299 * red + 0.587 * p[1] + 0.114 * blue; 3];
+            }
+            *p = std::array::from_fn(|c| (white * p[c] - mean[c]) / spread[c]);
+        }
+        let n = self.takes.channels;
+        let (w, h) = (width as usize, height as usize);
+        let (shape, data) = match self.takes.channels_last {
+            true => (
+                [1, h, w, n],
+                rgb.iter().flat_map(|p| p[..n].iter().copied()).collect::<Vec<f32>>(),
+            ),
+            false => ([1, n, h, w], (0..n).flat_map(|c| rgb.iter().map(move |p| p[c])).collect()),
+        };
+        Value::from_shape(shape, data).map_err(wrong)
+    }
+}
+
+impl ContourDetector for Network {
     /// Computes the map of a photograph, at the network's own size or else at a longer
     /// side of at most about `size` pixels, with sides rounded to multiples of 32.
     ///
     /// # Errors
     /// If the network fails, or returns anything but a map of one channel in the aspect
     /// ratio of its input.
-    pub fn map(&self, photo: &Photo, size: u32) -> Result<SoftMap, VisionError> {
+    fn map(&self, photo: &Photo, size: u32) -> Result<SoftMap, VisionError> {
         let own = fitted(photo.width(), photo.height(), size);
         let round = |n: u32| ((n + MULTIPLE / 2) / MULTIPLE * MULTIPLE).max(MULTIPLE);
         let width = self.takes.width.unwrap_or_else(|| round(own.0));
@@ -140,35 +166,17 @@ impl Network {
         Ok(SoftMap { width, height, values, shows: self.options.shows })
     }
 
-    fn unfit(&self, why: &str) -> VisionError {
-        wrong(format!("the output `{}` {why}", self.called))
+    fn sigma(&self) -> f32 {
+        match self.options.shows {
+            Shows::Contours => 1.0,
+            Shows::Objects => 1.6,
+        }
     }
 
-    /// Converts the photograph to the network's input format.
-    fn picture(&self, photo: &Photo, width: u32, height: u32) -> Result<Value, VisionError> {
-        let NetworkOptions { bgr, white, mean, spread, .. } = self.options;
-        let mut rgb = photo.srgb(width, height);
-        for p in &mut rgb {
-            if bgr {
-                p.swap(0, 2);
-            }
-            if self.takes.channels == 1 {
-                let [red, blue] = if bgr { [p[2], p[0]] } else { [p[0], p[2]] };
-                // Luma of Rec. 601, which most grey pictures use.
-                *p = [0.299 * red + 0.587 * p[1] + 0.114 * blue; 3];
-            }
-            *p = std::array::from_fn(|c| (white * p[c] - mean[c]) / spread[c]);
-        }
-        let n = self.takes.channels;
-        let (w, h) = (width as usize, height as usize);
-        let (shape, data) = match self.takes.channels_last {
-            true => (
-                [1, h, w, n],
-                rgb.iter().flat_map(|p| p[..n].iter().copied()).collect::<Vec<f32>>(),
-            ),
-            false => ([1, n, h, w], (0..n).flat_map(|c| rgb.iter().map(move |p| p[c])).collect()),
-        };
-        Value::from_shape(shape, data).map_err(wrong)
+    /// HED's best threshold against human outlines is 0.65; a few more edges help where the
+    /// object is dim.
+    fn strength(&self) -> f32 {
+        0.5
     }
 }
 

@@ -5,19 +5,10 @@
 //! the root node centered around the center of the mesh". Coincident points are merged
 //! into one vertex of the result, which is smooth, as every armature is. Joints have no
 //! limits; those belong to a prior. Invariant: the result depends on the mesh alone.
-
-mod groups;
-mod near;
-mod skeleton;
-mod skin;
-#[cfg(test)]
-mod tests;
-mod tree;
-mod voxels;
-
-use super::{Armature, Influence, NamedJoint, Rig};
-use crate::geom::{GeomError, Mesh, edges};
+use crate::{groups, skeleton, skin, tree, voxels};
 use glam::{DVec3, Vec3};
+use pcadlang_scene::geom::armature::{Armature, Influence, NamedJoint, Rig};
+use pcadlang_scene::geom::{GeomError, Mesh, weld};
 
 /// The maximum number of groups for [`by_groups`].
 pub const MOST_GROUPS: usize = 256;
@@ -83,7 +74,7 @@ pub fn by_skeleton(mesh: &Mesh, most: usize) -> Result<Armature, GeomError> {
 
 /// Merges coincident points; vertices are in order of first use.
 fn welded(mesh: &Mesh) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let first = edges::weld(&mesh.positions);
+    let first = weld(&mesh.positions);
     let mut number = vec![u32::MAX; mesh.positions.len()];
     let mut positions = Vec::new();
     let mut of = |v: u32| {
@@ -100,11 +91,11 @@ fn welded(mesh: &Mesh) -> (Vec<Vec3>, Vec<[u32; 3]>) {
 
 /// A joint. Parents are given by index and come before their children.
 #[derive(Clone, Debug)]
-struct Bone {
-    name: String,
-    parent: Option<usize>,
-    head: DVec3,
-    tail: DVec3,
+pub(crate) struct Bone {
+    pub name: String,
+    pub parent: Option<usize>,
+    pub head: DVec3,
+    pub tail: DVec3,
 }
 
 fn finish(

@@ -21,11 +21,9 @@ mod writer;
 
 pub use options::ForestOptions;
 
-use crate::vision::VisionError;
-use crate::vision::detect::soft_map::{Shows, SoftMap};
-use crate::vision::pictures::photo::Photo;
-use crate::vision::pictures::resize::fitted;
 use features::Features;
+use pcadlang_scene::vision::resize::fitted;
+use pcadlang_scene::vision::{ContourDetector, Photo, Shows, SoftMap, VisionError};
 use std::fmt;
 
 /// A node of a tree. The first child has a larger index than its parent, so every path
@@ -89,5 +87,21 @@ impl Forest {
         let features = Features::of(&small, width as usize, height as usize, &self.options);
         let values = trees::edges(self, &features, width as usize, height as usize);
         SoftMap { width, height, values, shows: Shows::Contours }
+    }
+}
+
+impl ContourDetector for Forest {
+    fn map(&self, photo: &Photo, size: u32) -> Result<SoftMap, VisionError> {
+        Ok(Forest::map(self, photo, size))
+    }
+
+    fn sigma(&self) -> f32 {
+        1.0
+    }
+
+    /// Edges whose presence all trees agree on, but not their exact position, are about this
+    /// strong; few pixels come close to 1.
+    fn strength(&self) -> f32 {
+        0.1
     }
 }
