@@ -18,7 +18,7 @@ pub use pcadlang_engine::lang::builtins::data::{
     Beside, DataFormat, Literal, Options as DataOptions,
 };
 #[doc(inline)]
-pub use pcadlang_engine::lang::builtins::{Args, Defaults, InputHook, Type};
+pub use pcadlang_engine::lang::builtins::{Args, Defaults, Domain, InputHook, Type};
 #[doc(inline)]
 pub use pcadlang_engine::lang::error::{Fault, FaultKind};
 #[doc(inline)]

@@ -72,6 +72,62 @@ impl fmt::Display for Type {
     }
 }
 
+/// The values of its type that an argument takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Domain {
+    /// All of them.
+    Any,
+    /// Positive, finite numbers.
+    Positive,
+    /// Finite numbers, at least 0.
+    NotNegative,
+    /// Numbers within bounds.
+    From([f64; 2]),
+    /// Numbers above 0 and below 1.
+    Between01,
+    /// Numbers from 0 and below 1.
+    Below1,
+    /// Whole numbers within bounds.
+    Whole([u32; 2]),
+    /// Some words.
+    Words(&'static [&'static str]),
+}
+
+impl Domain {
+    /// Returns whether a number is within.
+    pub fn holds(self, x: f64) -> bool {
+        match self {
+            Domain::Any | Domain::Words(_) => true,
+            Domain::Positive => x > 0.0 && x.is_finite(),
+            Domain::NotNegative => x >= 0.0 && x.is_finite(),
+            Domain::From([low, high]) => (low..=high).contains(&x),
+            Domain::Between01 => x > 0.0 && x < 1.0,
+            Domain::Below1 => (0.0..1.0).contains(&x),
+            Domain::Whole([low, high]) => {
+                x == libm::trunc(x) && x >= f64::from(low) && x <= f64::from(high)
+            }
+        }
+    }
+}
+
+impl fmt::Display for Domain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Domain::Any => f.write_str("any"),
+            Domain::Positive => f.write_str("positive and finite"),
+            Domain::NotNegative => f.write_str("not negative and finite"),
+            Domain::From([low, high]) => write!(f, "from {low} to {high}"),
+            Domain::Between01 => f.write_str("strictly between 0 and 1"),
+            Domain::Below1 => f.write_str("from 0 to less than 1"),
+            Domain::Whole([low, high]) => write!(f, "a whole number from {low} to {high}"),
+            Domain::Words(words) => {
+                let quoted: Vec<String> = words.iter().map(|w| format!("\"{w}\"")).collect();
+                write!(f, "one of {}", quoted.join(", "))
+            }
+        }
+    }
+}
+
 /// One argument.
 #[derive(Clone, Debug)]
 pub struct Argument {
@@ -79,6 +135,8 @@ pub struct Argument {
     pub name: Text,
     /// Its type.
     pub ty: Type,
+    /// The values of that type that it takes.
+    pub domain: Domain,
     /// Its unit, or empty.
     pub unit: Text,
     /// The default as shown in the reference; `None` for a required argument.

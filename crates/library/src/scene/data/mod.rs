@@ -8,7 +8,7 @@ use super::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue, So
 use pcadlang_engine::lang::builtins::data::{
     Beside, DataFormat, FILE, Literal, Options, kind, unreadable,
 };
-use pcadlang_engine::lang::builtins::{Arg, Row, Type, arg, opt};
+use pcadlang_engine::lang::builtins::{Arg, Default, Row, Type, arg, flag, num, opt, word};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::geom::{FileFrame, GeomError, Solid, gltf, obj};
@@ -20,45 +20,34 @@ use std::sync::Arc;
 
 const SHAPE: &[Arg] = &[
     arg("file", Type::Str, "The path, relative to the program's folder."),
-    opt(
-        "up",
-        Type::Str,
-        "\"y\"",
-        "The file's up axis: \"x\", \"y\" or \"z\"; it is rotated to +y.",
-    ),
-    opt(
-        "unit",
-        Type::Num,
-        "1",
-        "The length of the file's unit in scene units: 0.01 for centimetres.",
-    )
-    .unit("m"),
+    word("up", &["y", "x", "z"], "The file's up axis: \"x\", \"y\" or \"z\"; it is rotated to +y."),
+    num("unit", 1.0, "The length of the file's unit in scene units: 0.01 for centimetres.")
+        .unit("m"),
 ];
 
 const NETWORK: &[Arg] = &[
     opt("file", Type::Str, "none", "The path, relative to the program's folder."),
-    opt(
+    word(
         "colours",
-        Type::Str,
-        "\"rgb\"",
+        &["rgb", "bgr"],
         "The order of the network's input channels, \"rgb\" or \"bgr\".",
     ),
-    opt(
+    num(
         "white",
-        Type::Num,
-        "1",
+        1.0,
         "The value of white, above 0; the network's input is (value - mean) / spread.",
     ),
-    opt("mean", Type::Any, "0", "The mean to subtract: a number, or one per channel."),
-    opt("spread", Type::Any, "1", "The divisor: a number, or one per channel."),
+    arg("mean", Type::Any, "The mean to subtract: a number, or one per channel.")
+        .or(Default::Num(0.0)),
+    arg("spread", Type::Any, "The divisor: a number, or one per channel.").or(Default::Num(1.0)),
     opt(
         "output",
         Type::Any,
         "the last",
         "The output to use as the map: its name, or its number from 1.",
     ),
-    opt("logits", Type::Bool, "false", "Whether the map holds log odds instead of probabilities."),
-    opt("shows", Type::Str, "\"contours\"", "What the map shows, \"contours\" or \"objects\"."),
+    flag("logits", "Whether the map holds log odds instead of probabilities."),
+    word("shows", &["contours", "objects"], "What the map shows, \"contours\" or \"objects\"."),
 ];
 
 pub(super) const TABLE: &[Row] = &[
