@@ -13,7 +13,7 @@ use common::{dense, lathe, pose, short, standing, vase};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use glam::{DVec3, Vec3};
 use pcadlang_scene::geom::armature::{JointPose, Rules};
-use pcadlang_scene::geom::{Affine, Caps, Mesh, Profile, Solid};
+use pcadlang_scene::geom::{self, Affine, Caps, Mesh, Profile, Solid};
 use pcadlang_scene::render::{Camera, Channels, Contours, Frame, View};
 use pcadlang_scene::vision::ContourMap;
 use pcadlang_scene::vision::chamfer::{Chamfer, ChamferOptions, Scratch};
@@ -70,7 +70,7 @@ fn round(c: &mut Criterion) {
     for (name, wall, caps) in [("closed", 0.0, Caps::Both), ("vessel", 0.1, Caps::Bottom)] {
         let solid = |sides: u32| match sides {
             0 => Solid::exact_lathe(&profile, 96, wall, caps).expect("a lathe"),
-            _ => Solid::lathe(&profile, sides, wall, caps).expect("a lathe"),
+            _ => Solid::new(Arc::new(geom::lathe(&profile, sides, wall, caps).expect("a lathe"))),
         };
         let seen = Contours::of(&solid(0).placed(pose(&mut 0.0)), &camera);
         let map = ContourMap::of(&seen.slice());

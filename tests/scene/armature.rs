@@ -4,7 +4,7 @@
 //! `data/mocap_poses.csv` holds two poses obtained from mocap.cs.cmu.edu (funded by NSF
 //! EIA-0196217), retargeted to the rig.
 
-use crate::subjects::shipped;
+use crate::shipped;
 use glam::{DAffine3, DVec3};
 use pcadlang_scene::geom::Affine;
 use pcadlang_scene::geom::armature::{Armature, JointPose, Posed, Rules, Stretch, Turn};

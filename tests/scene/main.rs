@@ -5,13 +5,12 @@ mod common;
 #[allow(dead_code)]
 #[path = "../../crates/scene/src/vision/detect/forest/writer.rs"]
 mod forests;
-#[path = "../../benches/src/bin/detail_price/subjects.rs"]
-mod subjects;
+#[path = "../../benches/src/bin/shipped/mod.rs"]
+mod shipped;
 
 mod armature;
 mod autorig;
 mod caches;
-mod detail;
 mod detectors;
 mod drawing;
 mod gltf;

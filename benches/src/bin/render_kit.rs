@@ -10,7 +10,7 @@
 //! (contour elements for pcadlang, contour pixels for the plain rasteriser), `likelihood`
 //! (the mean distance of these from the contours of the last pose), and
 //! `likelihood_newmesh` (also with new vertices each time, whose normals are recomputed;
-//! pcadlang only). `pcadlang_detail_…` are likelihoods with levels of detail.
+//! pcadlang only).
 
 mod clock;
 #[path = "render_kit/plain.rs"]
@@ -21,7 +21,7 @@ mod raw;
 use clock::processor_seconds;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use pcadlang_scene::geom::{Affine, Mesh, Solid};
-use pcadlang_scene::render::{Camera, Channels, Contours, Frame, Projection, View};
+use pcadlang_scene::render::{Camera, Channels, Contours, Frame, Projection};
 use pcadlang_scene::vision::ContourMap;
 use pcadlang_scene::vision::chamfer::{Chamfer, ChamferOptions, Scratch};
 use plain::Plain;
@@ -147,29 +147,6 @@ fn ours(
     };
     case.measure("pcadlang", "likelihood", "", |i| likelihood(&at(i)));
     let Some(mesh) = solid.instances().first().map(|i| Arc::clone(&i.mesh)) else { return Ok(()) };
-    // These do less work: the mesh is as coarse as possible with every vertex within
-    // `detail` pixels. The line also gives the resulting change of the distance.
-    let lasting = Solid::lasting((*mesh).clone());
-    for (peer, detail) in [("pcadlang_detail_0.1", 0.1), ("pcadlang_detail_0.25", 0.25)] {
-        if !(case.chosen)(peer, "likelihood") {
-            continue;
-        }
-        let view =
-            |i: usize| View::with_detail(placed(&lasting, &poses[i % poses.len()]), camera, detail);
-        let rho = |c: &Contours| chamfer.distance(&c.slice()) * c.slice().diagonal() / 100.0;
-        let off = |i: usize| {
-            (rho(&view(i).contours(case.size)) - rho(&Contours::of(&at(i), &camera))).abs()
-        };
-        let mut off: Vec<f64> = (0..poses.len()).map(off).collect();
-        off.sort_by(f64::total_cmp);
-        let (median, most) = (off[off.len() / 2], off[off.len() - 1]);
-        let extra =
-            format!(",\"distance_off_px_median\":{median:.3},\"distance_off_px_most\":{most:.3}");
-        case.measure(peer, "likelihood", &extra, |i| {
-            let contours = view(i).contours(case.size);
-            std::hint::black_box(chamfer.log_likelihood(&contours.slice()));
-        });
-    }
     let shapes: Vec<Vec<Vec3>> = (0..16).map(|k| deformed(&mesh, k)).collect();
     case.measure("pcadlang", "likelihood_newmesh", "", |i| {
         let positions = shapes[i % shapes.len()].clone();

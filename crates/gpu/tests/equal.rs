@@ -50,9 +50,9 @@ fn meshes_are_drawn_as_on_the_cpu() -> Tested {
             1 => scenes::lathe(i as u64, 24, 0.0, Caps::Bottom)?,
             2 => scenes::lathe(i as u64, 64, 0.05, Caps::Bottom)?,
             3 => Solid::new(Arc::new(cuboid(DVec3::new(1.1, 1.4, 0.9))?)),
-            4 => Solid::sphere(0.8, 48)?,
+            4 => Solid::new(Arc::new(sphere(0.8, 48)?)),
             _ => {
-                let ball = Solid::sphere(0.4, 32)?;
+                let ball = Solid::new(Arc::new(sphere(0.4, 32)?));
                 let box_ = Solid::new(Arc::new(cuboid(DVec3::new(1.6, 0.3, 0.5))?));
                 let lathe = scenes::lathe(3, 32, 0.0, Caps::Top)?;
                 let there = Affine::new(DVec3::new(0.4, 0.2, 0.5), DVec3::ZERO, DVec3::ONE);

@@ -7,7 +7,7 @@ mod pictures;
 mod scores;
 mod shapes;
 
-use crate::subjects::shipped;
+use crate::shipped;
 use pcadlang_scene::geom::Mesh;
 use pcadlang_scene::geom::Solid;
 use pcadlang_scene::render::{Camera, Contours, Frame, View};

@@ -195,28 +195,3 @@ fn pictures_of_another_mesh_and_placement() {
         assert!(check("the mesh again", &placed(base)) == first);
     }
 }
-
-/// Coarser versions of a mesh, by tolerance, picture size and camera.
-#[test]
-fn meshes_at_other_details() {
-    let part = Profile { y: vec![-1.0, -0.6, -0.1, 0.4, 0.9], r: vec![0.3, 0.6, 0.65, 0.5, 0.2] };
-    let make = || Solid::lathe(std::slice::from_ref(&part), 48, 0.0, Caps::Both).unwrap();
-    let shared = make();
-    let near = Camera { eye: DVec3::new(0.0, 0.0, 5.0), ..Camera::default_for(200, 200) };
-    for detail in [0.0, 0.2, 1.0, 4.0, 0.5, 0.2, 0.0] {
-        for size in [32, 200, 64] {
-            for camera in [Camera::default_for(200, 200), near] {
-                let see = |solid: Solid| {
-                    let view = View::with_detail(solid, camera, detail);
-                    (
-                        contour_bits(&view.contours(size)),
-                        frame_bits(&view.depth(size)),
-                        view.triangles(size),
-                    )
-                };
-                let here = see(shared.clone());
-                assert!(here == afresh(|| see(make())), "detail {detail} at {size} pixels");
-            }
-        }
-    }
-}

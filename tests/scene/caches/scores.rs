@@ -65,7 +65,7 @@ const SCENE: &str = "
     let rest = scene.group([scene.box([1, 0.4, 0.3]), scene.affine(translate = [-1.2, 0.4, 0]) * scene.sphere(0.3)]);
     let placed = scene.affine(translate = [<0,0.1>, <0,0.1>, <0,0.1>], rotate = [<0.1,0.1>, <0.2,0.1>, <0.4,0.1>],
         scale = <1,0.05>) * scene.group([vase, ball, rest, scene.affine(translate = [0, -1, 0]) * scene.sphere(0.2)]);
-    let view = scene.render(placed, camera = eye, detail = <0,0.5>);";
+    let view = scene.render(placed, camera = eye);";
 
 /// A single round surface, drawn without a mesh.
 const ROUND: &str = "
@@ -160,10 +160,10 @@ fn scores_of_other_arguments() {
             );
         }
         // A few arguments do not change this picture's score: the depth of the look-at
-        // point, a translation along the line of sight, levels of detail; the wall of a vessel
+        // point, a translation along the line of sight; the wall of a vessel
         // does not change its mask.
         println!("{shows} of {count} show: {compared}");
-        let few = if scene == ROUND { 7 } else { 5 };
+        let few = if scene == ROUND { 7 } else { 4 };
         assert!(shows + few >= count, "{compared}: {shows} of {count} arguments change the score");
     }
 }

@@ -113,7 +113,6 @@ fn pull(object: &str, round: bool) {
     let half = 0.5 * 4.4 / 64.0;
     for (likelihood, seen) in [
         ("scene.chamfer(view, sigma = s, size = 64)", Value::object(disc())),
-        ("scene.chamfer(rough, sigma = s, size = 64)", Value::object(disc())),
         (
             "scene.chamfer(view, sigma = s, size = 64, mode = \"sum\", symmetric = true)",
             Value::object(disc()),
@@ -136,7 +135,7 @@ fn pull(object: &str, round: bool) {
              let profile = {{ y: r * h, r: r * (0.6 + 0.25 * sin(2.5 * h)) }};
              let solid = scene.centred({object});
              let placed = scene.affine(translate = [x, y, 0], rotate = [t, 0.2, 0.4]) * solid;
-             assume view = scene.render(placed); let rough = scene.render(placed, detail = 0.3);
+             assume view = scene.render(placed);
              observe {likelihood} = photo as picture;"
         );
         let program = Program::parse(&text).unwrap().observe("photo", seen);

@@ -70,7 +70,7 @@ pub fn lathe(seed: u64, sides: u32, wall: f64, caps: Caps) -> Result<Solid, Box<
     let profile = [profile(seed)];
     Ok(match sides {
         0 => Solid::exact_lathe(&profile, 96, wall, caps)?,
-        _ => Solid::lathe(&profile, sides, wall, caps)?,
+        _ => Solid::new(Arc::new(lathe(&profile, sides, wall, caps)?)),
     })
 }
 

@@ -113,12 +113,8 @@ pub(super) const TABLE: &[Row] = &[
 ];
 
 /// Describes the approximations in rendering.
-pub(super) fn drawn(view: &View, size: u32) -> String {
-    let coarse = match view.detail() {
-        0.0 => String::new(),
-        d => format!(", contours from meshes simplified by up to {d} pixels"),
-    };
-    format!("rendered at {size} pixels in single precision{coarse}")
+pub(super) fn drawn(size: u32) -> String {
+    format!("rendered at {size} pixels in single precision")
 }
 
 pub(super) fn likelihood(l: impl Likelihood + 'static) -> Result<Value, Fault> {
@@ -274,7 +270,7 @@ impl Likelihood for ContourOf {
     fn approximations(&self) -> Vec<String> {
         let cut =
             format!("edges beyond {}% of the diagonal are not matched", self.options.truncate);
-        vec![drawn(&self.view, self.size), cut]
+        vec![drawn(self.size), cut]
     }
 }
 
@@ -339,7 +335,7 @@ impl Likelihood for ChamferOf {
             "of more than {} observed points, an evenly spaced subset is used",
             chamfer::MOST_OBSERVED
         );
-        [Some(drawn(&self.view, self.size)), cut, self.options.symmetric.then_some(most)]
+        [Some(drawn(self.size)), cut, self.options.symmetric.then_some(most)]
             .into_iter()
             .flatten()
             .collect()
@@ -378,7 +374,7 @@ impl Likelihood for MaskOf {
     }
 
     fn approximations(&self) -> Vec<String> {
-        vec![drawn(&self.view, self.size)]
+        vec![drawn(self.size)]
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, Fault> {
@@ -437,11 +433,7 @@ impl DepthOf {
     fn prepared(&self, observed: &Value) -> Result<(Arc<DepthLikelihood>, Arc<Frame>), Fault> {
         let DepthValue { depth, prepared } = observation(observed, self.name(), "a depth map")?;
         same_shape((depth.width(), depth.height()), &self.view, self.name())?;
-        // Simplified meshes have other depths.
-        let frame = match self.view.detail() {
-            0.0 => self.view.depth(self.size),
-            _ => self.view.frame(self.size),
-        };
+        let frame = self.view.depth(self.size);
         let key = (self.options, frame.width, frame.height);
         let prepared = prepared.get(key, |([sd, outlier, near, far], w, h)| {
             let whole = DepthLikelihood::new(depth, *sd, *outlier, (*near, *far));
@@ -457,7 +449,7 @@ impl Likelihood for DepthOf {
     }
 
     fn approximations(&self) -> Vec<String> {
-        vec![drawn(&self.view, self.size)]
+        vec![drawn(self.size)]
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, Fault> {

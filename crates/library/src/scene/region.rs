@@ -132,7 +132,7 @@ impl Likelihood for RegionOf {
     }
 
     fn approximations(&self) -> Vec<String> {
-        vec![drawn(&self.view, self.size)]
+        vec![drawn(self.size)]
     }
 
     fn log_density(&self, observed: &Value) -> Result<f64, Fault> {

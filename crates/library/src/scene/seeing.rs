@@ -12,9 +12,6 @@ use std::sync::Arc;
 
 const SECTION: &str = "Seeing";
 
-/// The maximum tolerated error of contours, in pixels.
-const MOST_DETAIL: f64 = 16.0;
-
 pub(super) const TABLE: &[Row] = &[
     native(
         "camera",
@@ -69,28 +66,12 @@ pub(super) const TABLE: &[Row] = &[
         &[
             arg("solid", SOLID, "The solid to view."),
             opt("camera", CAMERA, "the run's", "The camera; by default, that of the run."),
-            num(
-                "detail",
-                0.0,
-                "Level of detail: the tolerated error of contours and silhouettes, so that meshes \
-                 can be simplified as far as their size in the picture allows; 0 draws the full \
-                 meshes.",
-            )
-            .unit("pixels"),
         ],
         VIEW,
         "A solid seen by a camera. It is rendered only when a likelihood or report needs it.",
         |a, previous| {
             let solid = a.object::<SolidValue>(0, "a solid")?;
-            let camera = camera(a, (256, 256))?;
-            let detail = a.num("detail")?;
-            if !(0.0..=MOST_DETAIL).contains(&detail) {
-                let message = format!(
-                    "scene.render: `detail` must be from 0 to {MOST_DETAIL} pixels, got {detail}"
-                );
-                return Err(Fault::domain(message));
-            }
-            let view = View::with_detail(solid.0.clone(), camera, detail);
+            let view = View::new(solid.0.clone(), camera(a, (256, 256))?);
             let view = match previous.and_then(|p| p.value.downcast::<ViewValue>()) {
                 Some(previous) => view.after(&previous.0),
                 None => view,
@@ -99,7 +80,7 @@ pub(super) const TABLE: &[Row] = &[
             Ok((Value::object(ViewValue(Arc::new(view))), Arc::new(())))
         },
     )
-    .vjp(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown, Adjoint::Unknown])),
+    .vjp(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown])),
     native(
         "bounds",
         SECTION,
@@ -135,11 +116,8 @@ mod tests {
             .map(|m| pcadlang_scene::geom::Solid::new(Arc::new(m)))
             .unwrap();
         let solid = cube.placed(Affine::new(at, DVec3::ZERO, DVec3::ONE));
-        let view = Value::object(ViewValue(Arc::new(View::with_detail(
-            solid,
-            Camera::default_for(256, 256),
-            0.0,
-        ))));
+        let view =
+            Value::object(ViewValue(Arc::new(View::new(solid, Camera::default_for(256, 256)))));
         let table = crate::standard::table();
         let builtin = table.get(table.find("scene", "bounds").unwrap());
         builtin.apply(&[&view]).unwrap().numbers()

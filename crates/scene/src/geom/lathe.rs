@@ -5,7 +5,6 @@
 //! into strips, and `revolve` sweeps them. Invariant: faces are oriented outward, and the
 //! mesh is watertight if both ends are closed.
 
-use super::detail::{Detail, Turned};
 use super::mesh::MOST_TRIANGLES;
 use super::profile_path::{OuterPath, Profile, Tolerance, Wall, floor_height, inner_wall};
 use super::real::{Real, Tape, Var};
@@ -68,38 +67,14 @@ pub fn lathe(
     wall: impl Into<Wall>,
     caps: Caps,
 ) -> Result<Mesh, GeomError> {
-    turned(parts, sides, wall.into(), caps).map(|(mesh, _)| mesh)
-}
-
-/// Returns the mesh, and the data that it was made from.
-fn turned(
-    parts: &[Profile],
-    sides: u32,
-    wall: Wall,
-    caps: Caps,
-) -> Result<(Mesh, Turned), GeomError> {
+    let wall = wall.into();
     check(parts, sides, wall)?;
     let Layout { strips, closed } = layout(parts, caps, wall, |x| x)?;
-    let count = parts.len() as u16 + 5;
-    Ok((revolve(&strips, sides, closed, count), Turned::new(strips, sides, closed, count)))
+    Ok(revolve(&strips, sides, closed, parts.len() as u16 + 5))
 }
 
 impl Solid {
-    /// Returns a [`lathe`] with coarser versions.
-    ///
-    /// # Errors
-    /// As [`lathe`].
-    pub fn lathe(
-        parts: &[Profile],
-        sides: u32,
-        wall: impl Into<Wall>,
-        caps: Caps,
-    ) -> Result<Solid, GeomError> {
-        turned(parts, sides, wall.into(), caps)
-            .map(|(mesh, turned)| Solid::detailed(mesh, Detail::turned(turned)))
-    }
-
-    /// As [`Solid::lathe`], for a solid that is drawn as the [`Revolution`] itself where it
+    /// As [`lathe`], for a solid that is drawn as the [`Revolution`] itself where it
     /// is the only object. `sides` is for the mesh, which is made when something else needs
     /// it: several objects in one picture, export, bounds.
     ///
@@ -120,43 +95,8 @@ impl Solid {
             mesh: Arc::new(revolve(&strips, sides, closed, count)),
             affine: Affine::IDENTITY,
             first_part: 0,
-            detail: Some(Arc::new(Detail::turned(Turned::new(strips, sides, closed, count)))),
             skin: None,
         }))
-    }
-}
-
-impl Revolution {
-    /// The surface that [`lathe`] makes a mesh of, with any number of sides.
-    ///
-    /// # Errors
-    /// As [`lathe`].
-    pub fn lathe(
-        parts: &[Profile],
-        wall: impl Into<Wall>,
-        caps: Caps,
-    ) -> Result<Revolution, GeomError> {
-        let wall = wall.into();
-        check(parts, FEWEST_SIDES, wall)?;
-        let Layout { strips, closed } = layout(parts, caps, wall, |x| x)?;
-        Ok(Revolution::new(&strips, closed, parts.len() as u16 + 5))
-    }
-
-    /// The vector-Jacobian product of [`Revolution::lathe`], given derivatives with respect
-    /// to the radius and the height of each ring. Which points are merged and which ends
-    /// are closed is held fixed.
-    ///
-    /// # Errors
-    /// As [`lathe`].
-    pub fn vjp_lathe(
-        parts: &[Profile],
-        wall: impl Into<Wall>,
-        caps: Caps,
-        by_ring: &[(f64, f64)],
-    ) -> Result<LatheGradient, GeomError> {
-        let wall = wall.into();
-        check(parts, FEWEST_SIDES, wall)?;
-        vjp_layout(parts, wall, caps, |_| by_ring.to_vec())
     }
 }
 

@@ -4,7 +4,7 @@
 //! each has one normal; edges know the faces on both sides across such splits. Meshes of
 //! one shape share their [`Topology`].
 
-use super::{Bounds, Clusters, Patches, Shape, Trees};
+use super::{Bounds, Patches};
 use glam::Vec3;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -142,8 +142,6 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// The triangles, parts and edges.
     pub topology: Arc<Topology>,
-    /// Its faces in clusters, if it is drawn often.
-    pub clusters: Clusters,
 }
 
 /// The angle between faces, in degrees, above which an edge is a crease.
@@ -159,19 +157,7 @@ pub const MOST_PARTS: usize = u16::MAX as usize;
 impl Mesh {
     /// Puts a mesh together from its vertices, a unit normal for each, and the rest.
     pub fn of(positions: Vec<Vec3>, normals: Vec<Vec3>, topology: Arc<Topology>) -> Mesh {
-        Mesh { positions, normals, topology, clusters: Clusters::default() }
-    }
-
-    /// Counts a drawing of the mesh, and returns the trees of its faces if it has been drawn
-    /// often.
-    pub(crate) fn drawn(&self) -> Option<&Trees> {
-        self.clusters.drawn(self.shape())
-    }
-
-    /// What clusters are made from.
-    pub(crate) fn shape(&self) -> Shape<'_> {
-        let Mesh { positions, normals, topology, .. } = self;
-        Shape { positions, normals, triangles: &topology.triangles }
+        Mesh { positions, normals, topology }
     }
 
     /// Returns the bounding box.

@@ -6,9 +6,7 @@
 mod affine;
 pub mod armature;
 mod bounds;
-mod clusters;
 mod cuboid;
-mod detail;
 mod edges;
 mod error;
 mod frame;
@@ -29,10 +27,7 @@ mod sphere;
 
 pub use affine::Affine;
 pub use bounds::Bounds;
-pub use clusters::Clusters;
-pub(crate) use clusters::{Faces, Few, LEAF, Node, Shape, Trees, WIDE};
 pub use cuboid::{cuboid, vjp_cuboid};
-pub use detail::{Coarse, Detail};
 pub use error::GeomError;
 pub use frame::{FileFrame, UpAxis};
 pub use landmark::Landmark;

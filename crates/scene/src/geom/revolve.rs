@@ -72,16 +72,6 @@ pub(super) fn ring_normal([a, b]: [(f64, f64); 2]) -> (f64, f64) {
     if length > 0.0 { (nr / length, ny / length) } else { (1.0, 0.0) }
 }
 
-/// Returns the topology of [`revolve`]'s mesh.
-pub(super) fn topology_of(
-    strips: &[Strip],
-    sides: u32,
-    closed: bool,
-    part_count: u16,
-) -> Arc<Topology> {
-    shared(strips, sides, closed, part_count).topology
-}
-
 fn shared(strips: &[Strip], sides: u32, closed: bool, part_count: u16) -> Shared {
     let rising = strips.iter().flat_map(|s| &s.points).is_sorted_by(|a, b| a.1 <= b.1);
     cached(signature(strips, sides, closed, part_count, rising), || {

@@ -5,7 +5,6 @@
 //! Invariants: a member's parts are numbered after those of the members before it
 //! (numbers beyond 65534 are all drawn as that one); all landmarks have different names.
 
-use super::detail::{Coarse, Detail};
 use super::landmark::{Landmark, unique};
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use super::posed_skin::PosedSkin;
@@ -25,25 +24,8 @@ pub struct Instance {
     pub affine: Affine,
     /// The offset added to its part numbers.
     pub first_part: u16,
-    /// Coarser versions of the mesh, if it has any.
-    pub detail: Option<Arc<Detail>>,
     /// The body it is a part of, if it is the part of a posed one.
     pub skin: Option<PosedSkin>,
-}
-
-impl Instance {
-    /// Returns the coarsest version of the mesh that is within `error` (in the mesh's
-    /// units) of every vertex it omits; `None` if that is the mesh itself.
-    pub fn coarse(&self, error: f64) -> Option<Arc<Coarse>> {
-        self.detail.as_ref()?.within(&self.mesh, error)
-    }
-
-    /// Returns the centre and radius of a ball around the mesh, in world coordinates;
-    /// `None` if it has no coarser versions.
-    pub fn ball(&self) -> Option<(DVec3, f64)> {
-        let (centre, radius) = self.detail.as_ref()?.ball(&self.mesh);
-        Some((self.affine.point(centre), radius * self.affine.stretch()))
-    }
 }
 
 /// A list that is computed on first use.
@@ -173,23 +155,8 @@ impl Solid {
             mesh,
             affine: Affine::IDENTITY,
             first_part: 0,
-            detail: None,
             skin: None,
         }]))
-    }
-
-    /// A mesh that will be drawn many times, such as a file's. Its coarser versions are
-    /// computed when a view first needs one, once for all placements of the solid (in
-    /// about a second for 100,000 triangles).
-    pub fn lasting(mesh: Mesh) -> Solid {
-        Solid::detailed(mesh, Detail::rigid())
-    }
-
-    /// A solid of one mesh with coarser versions.
-    pub(super) fn detailed(mesh: Mesh, detail: Detail) -> Solid {
-        let (mesh, detail) = (Arc::new(mesh), Some(Arc::new(detail)));
-        let (affine, first_part, skin) = (Affine::IDENTITY, 0, None);
-        Solid::of(Arc::new([Instance { mesh, affine, first_part, detail, skin }]))
     }
 
     /// A solid of placed meshes, without landmarks.

@@ -1,10 +1,9 @@
 //! Spheres made of meridians and rings. Invariant: normals are exactly those of the
 //! sphere.
 
-use super::detail::{Detail, Turned};
 use super::mesh::SMALLEST;
 use super::revolve::{Strip, revolve};
-use super::{GeomError, Mesh, Solid};
+use super::{GeomError, Mesh};
 use glam::DVec3;
 
 /// Returns a sphere around the origin with `sides` meridians and half as many rings.
@@ -12,21 +11,6 @@ use glam::DVec3;
 /// # Errors
 /// A radius outside 1e-30 to 1e6; fewer than 4 or more than 1024 sides.
 pub fn sphere(radius: f64, sides: u32) -> Result<Mesh, GeomError> {
-    turned(radius, sides).map(|(mesh, _)| mesh)
-}
-
-impl Solid {
-    /// Returns a [`sphere`] with coarser versions.
-    ///
-    /// # Errors
-    /// As [`sphere`].
-    pub fn sphere(radius: f64, sides: u32) -> Result<Solid, GeomError> {
-        turned(radius, sides).map(|(mesh, turned)| Solid::detailed(mesh, Detail::turned(turned)))
-    }
-}
-
-/// Returns the mesh, and the data that it was made from.
-fn turned(radius: f64, sides: u32) -> Result<(Mesh, Turned), GeomError> {
     if !(SMALLEST..=1e6).contains(&radius) {
         return Err(GeomError::domain(format!(
             "sphere: the radius must be from 1e-30 to 1e6, got {radius}"
@@ -42,12 +26,11 @@ fn turned(radius: f64, sides: u32) -> Result<(Mesh, Turned), GeomError> {
         (r, radius * libm::sin(angle))
     });
     let strip = Strip { points: points.collect(), parts: vec![0; rings as usize], blend: false };
-    let strips = vec![strip];
-    let mut mesh = revolve(&strips, sides, false, 1);
+    let mut mesh = revolve(&[strip], sides, false, 1);
     for (n, p) in mesh.normals.iter_mut().zip(&mesh.positions) {
         *n = p.as_dvec3().normalize_or(n.as_dvec3()).as_vec3();
     }
-    Ok((mesh, Turned::new(strips, sides, false, 1)))
+    Ok(mesh)
 }
 
 /// Pulls derivatives with respect to the vertices of a sphere of this radius back to the

@@ -67,7 +67,7 @@ fn ring_box(r: &PlacedRevolution, ring: &Ring, camera: &Camera) -> Option<Bounds
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::{Affine, Caps, Profile, Solid};
+    use crate::geom::{Affine, Caps, Profile, Solid, lathe};
 
     #[test]
     fn bounds_of_round_surfaces_are_those_of_fine_meshes() {
@@ -82,7 +82,8 @@ mod tests {
                     DVec3::new(turn, 0.4, 0.7),
                     scale.into(),
                 );
-                let fine = Solid::lathe(&profile, 1024, 0.0, Caps::Both).unwrap().placed(by);
+                let fine =
+                    Solid::new(lathe(&profile, 1024, 0.0, Caps::Both).unwrap().into()).placed(by);
                 let round = Solid::exact_lathe(&profile, 96, 0.0, Caps::Both).unwrap().placed(by);
                 let (a, b) = (fine.bounds().unwrap(), round.bounds().unwrap());
                 assert!((a.min - b.min).abs().max_element() < 1e-4, "{a:?} {b:?}");

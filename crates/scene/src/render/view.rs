@@ -5,9 +5,8 @@
 //! gets the same `Arc`.
 
 use super::canvas::Canvas;
-use super::detail::Drawn;
 use super::pixels::fractions::Fractions;
-use super::{Camera, Channels, ContourChange, Contours, Frame, FrameChange, Scene};
+use super::{Camera, Channels, ContourChange, Contours, Frame, FrameChange};
 use crate::geom::Solid;
 use glam::DVec3;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -19,8 +18,6 @@ type BySize<T> = Mutex<Vec<(u32, T)>>;
 pub struct View {
     solid: Solid,
     camera: Camera,
-    /// Tolerance of contours and depth, in pixels.
-    detail: f64,
     /// What it shares with the views before and after it.
     canvas: Canvas,
     frames: BySize<Arc<Frame>>,
@@ -47,17 +44,9 @@ struct Expected {
 impl View {
     /// A view; nothing is drawn yet.
     pub fn new(solid: Solid, camera: Camera) -> View {
-        View::with_detail(solid, camera, 0.0)
-    }
-
-    /// A view whose contours and depth may show simplified meshes, as long as every
-    /// omitted vertex is within `detail` pixels of what is drawn, whatever the size of
-    /// the picture; 0 for the full meshes.
-    pub fn with_detail(solid: Solid, camera: Camera, detail: f64) -> View {
         View {
             solid,
             camera,
-            detail,
             canvas: Canvas::default(),
             frames: Mutex::default(),
             frame_changes: Mutex::default(),
@@ -96,20 +85,7 @@ impl View {
         &self.camera
     }
 
-    /// Tolerance of contours and depth, in pixels.
-    pub fn detail(&self) -> f64 {
-        self.detail
-    }
-
-    /// The scene that contours and depth show in the picture whose longer side has `size`
-    /// pixels (0 counts as 1).
-    pub fn scene(&self, size: u32) -> Scene {
-        let camera = self.camera.scaled_to(size);
-        Scene { solid: self.drawn(&camera).solid, camera }
-    }
-
-    /// All channels of the picture whose longer side has `size` pixels (0 counts as 1),
-    /// with the full meshes.
+    /// All channels of the picture whose longer side has `size` pixels (0 counts as 1).
     pub fn frame(&self, size: u32) -> Arc<Frame> {
         // Not while the frames are locked: `frame_change` locks both the other way round.
         let on_canvas = find(&self.frame_changes, size).flatten();
@@ -143,12 +119,12 @@ impl View {
             let on_canvas = self.solid.revolution().is_none()
                 && (!contours || self.change_on_canvas(size).is_some());
             once(&self.depths, size, || {
-                let Scene { solid, camera } = self.scene(size);
-                let drawn = || self.canvas.depth(&solid, &camera, contours);
+                let (solid, camera) = (&self.solid, self.camera.scaled_to(size));
+                let drawn = || self.canvas.depth(solid, &camera, contours);
                 let depth = on_canvas.then(drawn).flatten();
                 Arc::new(match depth {
                     Some(depth) => Frame::of_depth(&camera, depth),
-                    None => drawn_frame(&solid, &camera, Channels::Depth),
+                    None => drawn_frame(solid, &camera, Channels::Depth),
                 })
             })
         })
@@ -163,10 +139,10 @@ impl View {
     /// The same, with what its derivatives need.
     pub(super) fn covered(&self, size: u32) -> Arc<Fractions> {
         once(&self.fractions, size, || {
-            let Scene { solid, camera } = self.scene(size);
-            let samples = solid.revolution().is_none().then(|| Fractions::of(&solid, &camera));
+            let (solid, camera) = (&self.solid, self.camera.scaled_to(size));
+            let samples = solid.revolution().is_none().then(|| Fractions::of(solid, &camera));
             Arc::new(samples.flatten().unwrap_or_else(|| {
-                let draw = |finer: &Camera| drawn_frame(&solid, finer, Channels::Depth);
+                let draw = |finer: &Camera| drawn_frame(solid, finer, Channels::Depth);
                 Fractions::by_pixels(&camera, draw)
             }))
         })
@@ -179,13 +155,13 @@ impl View {
             if let Some(change) = change.as_ref().filter(|c| c.moving.len() == c.count) {
                 return Arc::clone(&change.moving);
             }
-            let Scene { solid, camera } = self.scene(size);
+            let (solid, camera) = (&self.solid, self.camera.scaled_to(size));
             if change.is_some() {
-                return Arc::new(self.canvas.contours(&solid, &camera));
+                return Arc::new(self.canvas.contours(solid, &camera));
             }
             Arc::new(match self.depth_drawn(size).or_else(|| self.depth_expected(size)) {
-                Some(frame) => Contours::with_depth(&solid, &camera, &frame.depth),
-                None => Contours::of(&solid, &camera),
+                Some(frame) => Contours::with_depth(solid, &camera, &frame.depth),
+                None => Contours::of(solid, &camera),
             })
         })
     }
@@ -203,35 +179,15 @@ impl View {
             if self.solid.revolution().is_some() || self.depth_drawn(size).is_some() {
                 return None;
             }
-            let Scene { solid, camera } = self.scene(size);
-            self.canvas.change(&solid, &camera).map(Arc::new)
+            self.canvas.change(&self.solid, &self.camera.scaled_to(size)).map(Arc::new)
         })
     }
 
     /// The vector-Jacobian product of [`View::contours`] with respect to the solid's
-    /// vertices, as [`Contours::vjp`]; 0 for vertices that are not drawn.
+    /// vertices, as [`Contours::vjp`].
     pub fn vjp_contours(&self, size: u32, by_piece: &[[f64; 4]]) -> Vec<DVec3> {
         let camera = self.camera.scaled_to(size);
-        let drawn = self.drawn(&camera);
-        drawn.by_vertices_of(&self.solid, self.contours(size).vjp(&drawn.solid, &camera, by_piece))
-    }
-
-    /// The number of triangles that contours and depth show in the picture whose longer
-    /// side has `size` pixels.
-    pub fn triangles(&self, size: u32) -> usize {
-        let drawn = self.drawn(&self.camera.scaled_to(size));
-        drawn.solid.instances().iter().map(|i| i.mesh.topology.triangles.len()).sum()
-    }
-
-    /// The solid as contours and depth show it.
-    pub(super) fn drawn(&self, camera: &Camera) -> Drawn {
-        Drawn::new(&self.solid, camera, self.detail)
-    }
-
-    /// The frame of all channels, if it was drawn and can replace the depth frame: it
-    /// shows the full meshes, so only if depth does too.
-    fn frame_drawn(&self, size: u32) -> Option<Arc<Frame>> {
-        if self.detail > 0.0 { None } else { find(&self.frames, size) }
+        self.contours(size).vjp(&self.solid, &camera, by_piece)
     }
 
     /// Whether contours of this size are drawn, or expected to be asked for.
@@ -241,7 +197,7 @@ impl View {
 
     /// A frame with depth at least, if one is expected to be asked for.
     fn depth_expected(&self, size: u32) -> Option<Arc<Frame>> {
-        if self.detail <= 0.0 && self.expected.frames.contains(&size) {
+        if self.expected.frames.contains(&size) {
             return Some(self.frame(size));
         }
         self.expected.depths.contains(&size).then(|| self.depth(size))
@@ -249,7 +205,7 @@ impl View {
 
     /// A frame with depth at least, if one was drawn.
     fn depth_drawn(&self, size: u32) -> Option<Arc<Frame>> {
-        self.frame_drawn(size).or_else(|| find(&self.depths, size))
+        find(&self.frames, size).or_else(|| find(&self.depths, size))
     }
 }
 

@@ -79,7 +79,13 @@ impl Features {
         let Features::Contours { size } = self else {
             return in_parallel(threads, views, |view| self.of(&view));
         };
-        let scenes: Vec<Scene> = views.iter().map(|view| view.scene(*size)).collect();
+        let scenes: Vec<Scene> = views
+            .iter()
+            .map(|view| Scene {
+                solid: view.solid().clone(),
+                camera: view.camera().scaled_to(*size),
+            })
+            .collect();
         let batch = renderer.contours(&scenes);
         in_parallel(threads, (0..batch.len()).collect(), |i| {
             let elements = batch.scene(i);

@@ -12,6 +12,10 @@ use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
+/// Arguments that built-ins had, and what takes their place.
+const FORMER: &[(&str, &str, &str)] =
+    &[("scene.render", "detail", "every mesh is drawn as it is, so leave it out")];
+
 /// A name or text, of the language or of a host.
 pub type Text = Cow<'static, str>;
 
@@ -470,6 +474,10 @@ impl Builtin {
     }
 
     fn no_such_argument(&self, keyword: &str) -> String {
+        let name = self.full_name();
+        if let Some((.., now)) = FORMER.iter().find(|(of, k, _)| (*of, *k) == (&*name, keyword)) {
+            return format!("`{name}` has no argument `{keyword}` any more; {now}");
+        }
         let hint = match pcadlang_syntax::diag::nearest(keyword, self.args.iter().map(|a| &*a.name))
         {
             Some(near) => format!("; did you mean `{near}`?"),
@@ -479,6 +487,6 @@ impl Builtin {
                 self.args.iter().map(|a| &*a.name).collect::<Vec<_>>().join(", ")
             ),
         };
-        format!("`{}` has no argument `{keyword}`{hint}", self.full_name())
+        format!("`{name}` has no argument `{keyword}`{hint}")
     }
 }

@@ -214,7 +214,8 @@ fn mesh(file: &str, bytes: &[u8], frame: &FileFrame, beside: &Beside) -> Result<
         true => gltf::load(bytes, frame, beside).and_then(gltf::Loaded::mesh),
         false => obj::load_in(bytes, frame),
     };
-    mesh.map(|m| Value::object(SolidValue(Solid::lasting(m)))).map_err(|e: GeomError| e.to_string())
+    mesh.map(|m| Value::object(SolidValue(Solid::new(Arc::new(m)))))
+        .map_err(|e: GeomError| e.to_string())
 }
 
 /// A person's joints; `#ID` after the path selects the person.

@@ -7,7 +7,9 @@ use glam::DVec3;
 use pcadlang_engine::lang::builtins::{Args, Default, Row, Type, arg, flag, int, num, word};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
-use pcadlang_scene::geom::{Affine, Caps, Landmark, Profile, Solid, Wall, cuboid};
+use pcadlang_scene::geom::{
+    Affine, Caps, Landmark, Profile, Solid, Wall, cuboid, lathe, sphere,
+};
 use std::sync::Arc;
 
 const SECTION: &str = "Shapes";
@@ -37,7 +39,7 @@ pub(super) const TABLE: &[Row] = &[
             let LatheArgs { profiles, sides, round, wall, caps } = lathe_args(a)?;
             let made = match round {
                 true => Solid::exact_lathe(&profiles, sides, wall, caps),
-                false => Solid::lathe(&profiles, sides, wall, caps),
+                false => lathe(&profiles, sides, wall, caps).map(|m| Solid::new(Arc::new(m))),
             };
             made.map(solid).map_err(fault)
         },
@@ -53,7 +55,8 @@ pub(super) const TABLE: &[Row] = &[
         SOLID,
         "A sphere centred at the origin.",
         |a| {
-            Solid::sphere(a.num("radius")?, a.int("sides")?).map(solid).map_err(fault)
+            let made = sphere(a.num("radius")?, a.int("sides")?);
+            made.map(|m| solid(Solid::new(Arc::new(m)))).map_err(fault)
         },
     )
     .vjp(vjps::sphere),

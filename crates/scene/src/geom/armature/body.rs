@@ -8,10 +8,9 @@
 
 use super::morph::{Anchor, Morph};
 use super::{JointPose, Rig, Rules};
-use crate::geom::detail::{self, Detail, Level, Levels};
 use crate::geom::{Affine, GeomError, Instance, Mesh, Topology, edges, outer};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
-use std::sync::{Arc, LazyLock, OnceLock};
+use std::sync::{Arc, LazyLock};
 
 /// The maximum number of joints that move a vertex.
 pub const MOST_WEIGHTS: usize = 4;
@@ -61,22 +60,8 @@ pub(super) struct Skin {
     morphs: Vec<Morph>,
     /// For each keypoint, what it follows when the shape changes.
     anchors: Vec<Anchor>,
-    /// The surface before any change of shape, and the coarser levels of detail made from
-    /// it, by part.
+    /// The surface before any change of shape.
     rest: Arc<LazySurface>,
-    levels: OnceLock<Vec<Vec<Level>>>,
-}
-
-impl Levels for Skin {
-    /// Computed from the whole body on first use, so that the parts' boundaries share
-    /// vertices.
-    fn levels(&self, part: usize) -> &[Level] {
-        let all = self.levels.get_or_init(|| {
-            let parts = self.parts.iter().map(|p| (&*p.vertices, &*p.topology));
-            detail::levels_of_parts(&self.rest.positions, &parts.collect::<Vec<_>>())
-        });
-        all.get(part).map_or(&[], |levels| levels)
-    }
 }
 
 /// The vertices at rest, and their normals.
@@ -169,9 +154,9 @@ impl Armature {
             rig.keypoints().iter().map(|k| Anchor::of(k, &rig, &surface.positions)).collect();
         let lazy: LazySurface = LazyLock::new(Box::new(|| surface));
         LazyLock::force(&lazy);
-        let (surface, levels) = (Arc::new(lazy), OnceLock::new());
+        let surface = Arc::new(lazy);
         let rest = Arc::clone(&surface);
-        let skin = Skin { triangles, influences, parts, morphs: Vec::new(), anchors, rest, levels };
+        let skin = Skin { triangles, influences, parts, morphs: Vec::new(), anchors, rest };
         Ok(Armature { rig, surface, skin: Arc::new(skin) })
     }
 
@@ -371,14 +356,7 @@ impl Armature {
                 .push(Vec3::from((cofactor(&m.matrix3) * Vec3A::from(n)).normalize_or(Vec3A::Y)));
         }
         let mesh = Arc::new(Mesh::of(positions, normals, Arc::clone(&part.topology)));
-        let detail = Detail::posed(Arc::clone(&self.skin) as Arc<dyn Levels>, number);
-        Instance {
-            mesh,
-            affine: Affine::IDENTITY,
-            first_part: part.joint,
-            detail: Some(Arc::new(detail)),
-            skin: None,
-        }
+        Instance { mesh, affine: Affine::IDENTITY, first_part: part.joint, skin: None }
     }
 
     /// The vector-Jacobian product of posing with respect to the joints' transforms,

@@ -8,7 +8,7 @@
 //! smooth silhouette, that part of it is missed.
 
 use crate::render::View;
-use crate::render::derivatives::vjp::{vjp_some, vjp_turned};
+use crate::render::derivatives::vjp::vjp_some;
 use glam::DVec3;
 
 /// Distance from a piece at which to test for the background, in pixels.
@@ -31,9 +31,8 @@ impl View {
     /// [`View::fractions`], which is no step function.
     pub fn vjp_fractions(&self, size: u32, gain: &[f64]) -> Vec<DVec3> {
         let camera = self.camera().scaled_to(size);
-        let drawn = self.drawn(&camera);
-        if let Some(by_vertex) = self.covered(size).vjp(&drawn.solid, &camera, gain) {
-            return drawn.by_vertices_of(self.solid(), by_vertex);
+        if let Some(by_vertex) = self.covered(size).vjp(self.solid(), &camera, gain) {
+            return by_vertex;
         }
         self.vjp_outline(size, |picture, piece, length| {
             let [x, y, tx, ty] = piece.map(f64::from);
@@ -51,41 +50,29 @@ impl View {
     fn vjp_outline(
         &self,
         size: u32,
-        gain: impl Fn(&Picture<'_>, [f32; 4], f32) -> f64,
+        gain: impl Fn(&DepthImage<'_>, [f32; 4], f32) -> f64,
     ) -> Vec<DVec3> {
         let frame = self.depth(size);
         let camera = self.camera().scaled_to(size);
-        let drawn = self.drawn(&camera);
-        let picture = Picture { width: camera.width, height: camera.height, depth: &frame.depth };
-        let by = |[x, y, tx, ty]: [f32; 4], length: f32| {
-            let [nx, ny] = picture.outward([x, y, tx, ty])?;
-            let by = f64::from(length) * gain(&picture, [x, y, tx, ty], length);
+        let picture =
+            DepthImage { width: camera.width, height: camera.height, depth: &frame.depth };
+        vjp_some(self.solid(), &camera, &frame.depth, |piece| {
+            let at = [piece.x, piece.y, piece.tx, piece.ty];
+            let [nx, ny] = picture.outward(at)?;
+            let by = f64::from(piece.length) * gain(&picture, at, piece.length);
             Some([by * nx, by * ny])
-        };
-        if drawn.solid.revolution().is_some() {
-            let c = self.contours(size);
-            let one = |i: usize| match by([c.x[i], c.y[i], c.tx[i], c.ty[i]], c.length[i]) {
-                Some([x, y]) => [x, y, 0.0, 0.0],
-                None => [0.0; 4],
-            };
-            let by_piece: Vec<[f64; 4]> = (0..c.len()).map(one).collect();
-            return vjp_turned(&drawn.solid, &camera, &by_piece).unwrap_or_default();
-        }
-        let by_vertex = vjp_some(&drawn.solid, &camera, &frame.depth, |piece| {
-            by([piece.x, piece.y, piece.tx, piece.ty], piece.length)
-        });
-        drawn.by_vertices_of(self.solid(), by_vertex)
+        })
     }
 }
 
 /// A depth image.
-struct Picture<'a> {
+struct DepthImage<'a> {
     width: u32,
     height: u32,
     depth: &'a [f32],
 }
 
-impl Picture<'_> {
+impl DepthImage<'_> {
     /// The direction towards the background, if a piece at this position with this tangent
     /// is part of the outline.
     fn outward(&self, piece: [f32; 4]) -> Option<[f64; 2]> {
@@ -137,7 +124,7 @@ mod tests {
 
     #[test]
     fn gains_are_read_bilinearly_up_to_the_border() {
-        let picture = |width, height| Picture { width, height, depth: &[] };
+        let picture = |width, height| DepthImage { width, height, depth: &[] };
         let gain = [1.0, 2.0, 4.0, 3.0, 5.0, 9.0];
         for (x, y, expected) in [
             (0.5, 0.5, 1.0),
@@ -256,7 +243,7 @@ mod tests {
         let view = View::new(solid, Camera::default_for(96, 80));
         let gain: Vec<f64> = (0..96 * 80).map(|i| 0.1 * f64::from(i % 37) - 1.0).collect();
         let (frame, contours, camera) = (view.depth(96), view.contours(96), view.camera());
-        let picture = Picture { width: 96, height: 80, depth: &frame.depth };
+        let picture = DepthImage { width: 96, height: 80, depth: &frame.depth };
         let mut counted = 0;
         let by: Vec<[f64; 4]> = (0..contours.len())
             .map(|i| {

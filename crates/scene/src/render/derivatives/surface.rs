@@ -5,9 +5,9 @@
 //! the choice of that face is held fixed. [`View::vjp_mask`] accounts for the motion of
 //! the outline.
 
+use crate::render::View;
 use crate::render::pixels::project::{Projected, project};
 use crate::render::pixels::raster::{each_triangle, empty};
-use crate::render::{Frame, View};
 use glam::DVec3;
 
 impl View {
@@ -17,10 +17,6 @@ impl View {
     /// solid are ignored.
     pub fn vjp_depth(&self, size: u32, by_depth: &[f64]) -> Vec<DVec3> {
         let (solid, camera) = (self.solid(), self.camera().scaled_to(size));
-        if let (Some(r), Some(item)) = (solid.revolution(), solid.instances().first()) {
-            let gradient = Frame::vjp_revolution(&r.surface, &r.affine, &camera, by_depth);
-            return gradient.by_vertex(&r.surface, &r.affine, &item.mesh.positions);
-        }
         let mut projected = Projected::default();
         project(solid, &camera, &mut projected);
         let mut nearest = vec![empty(&camera); camera.pixels()];

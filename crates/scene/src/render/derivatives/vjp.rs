@@ -37,8 +37,11 @@ impl Contours {
         by_piece: &[[f64; 4]],
         steady: f64,
     ) -> Vec<DVec3> {
-        if let Some(by_vertex) = vjp_turned(solid, camera, by_piece) {
-            return by_vertex;
+        if solid.revolution().is_some() {
+            let meshes = Solid::of(solid.instances().into());
+            let contours = Contours::of(&meshes, camera);
+            let by_piece = self.handed_over(&contours, by_piece);
+            return contours.vjp_with(&meshes, camera, &by_piece, steady);
         }
         let mut extracted = Vec::with_capacity(self.len() + self.len() / 4);
         self.each(solid, camera, |t| extracted.push(t));
@@ -66,9 +69,6 @@ impl Contours {
         camera: &Camera,
         by_piece: &[[f64; 4]],
     ) -> Vec<DVec3> {
-        if let Some(by_vertex) = vjp_turned(solid, camera, by_piece) {
-            return by_vertex;
-        }
         let mut out = vec![DVec3::ZERO; solid.vertex_count()];
         self.each(solid, camera, |t| {
             let by = t.seen.and_then(|i| by_piece.get(i));
@@ -79,6 +79,27 @@ impl Contours {
                 vjp_ends(&t.origin, &by, own);
             }
         });
+        out
+    }
+
+    /// The derivatives with respect to the pieces of a mesh's contours, given those with
+    /// respect to the pieces of the surface that it stands for: each moves, stretches and
+    /// turns with the nearest one that runs the same way.
+    fn handed_over(&self, to: &Contours, by_piece: &[[f64; 4]]) -> Vec<[f64; 4]> {
+        let mut out = vec![[0.0; 4]; to.len()];
+        for (i, by) in by_piece.iter().enumerate().take(self.len()) {
+            let apart = |k: &usize| {
+                let (dx, dy) = (self.x[i] - to.x[*k], self.y[i] - to.y[*k]);
+                let along = self.tx[i] * to.tx[*k] + self.ty[i] * to.ty[*k];
+                dx * dx + dy * dy + 4.0 * (1.0 - along)
+            };
+            let nearest = (0..to.len()).min_by(|a, b| apart(a).total_cmp(&apart(b)));
+            if let Some(k) = nearest {
+                let stretch = f64::from(self.length[i] / to.length[k]);
+                let by = [by[0], by[1], by[2] * stretch, by[3]];
+                out[k].iter_mut().zip(by).for_each(|(sum, by)| *sum += by);
+            }
+        }
         out
     }
 
@@ -152,18 +173,6 @@ pub(in crate::render) fn vjp_some(
         });
     }
     out
-}
-
-/// The derivatives for a surface that is drawn without a mesh, by the vertices of its mesh.
-pub(in crate::render) fn vjp_turned(
-    solid: &Solid,
-    camera: &Camera,
-    by_piece: &[[f64; 4]],
-) -> Option<Vec<DVec3>> {
-    let r = solid.revolution()?;
-    let mesh = &solid.instances().first()?.mesh;
-    let gradient = Contours::vjp_revolution(&r.surface, &r.affine, camera, by_piece);
-    Some(gradient.by_vertex(&r.surface, &r.affine, &mesh.positions))
 }
 
 /// Maps the derivatives with respect to a piece to those with respect to the ends of its

@@ -13,9 +13,6 @@ use crate::render::lines::extraction::{Room, extract_mesh};
 use crate::render::lines::visibility::{Depths, Piece};
 use crate::render::pixels::project::{DepthRange, Placement, Projected, project};
 use crate::render::pixels::sparse_depth::SparseDepth;
-use crate::render::rigid::hiding::Hiding;
-use crate::render::rigid::pieces::{Found, extract_posed};
-use crate::render::rigid::{Posed, posed};
 use crate::render::{Camera, work};
 use std::cell::RefCell;
 
@@ -24,9 +21,7 @@ use std::cell::RefCell;
 struct Scratch {
     projected: Projected,
     room: Room,
-    found_faces: Found,
     looked: SparseDepth,
-    hiding: Hiding,
     /// Pieces, hidden or not.
     pieces: Vec<Piece>,
     hidden: Vec<bool>,
@@ -44,24 +39,7 @@ impl Contours {
         if let Some(r) = solid.revolution() {
             return Contours::of_revolution(&r.surface, &r.affine, camera);
         }
-        with_scratch(|scratch| {
-            if let Some(posed) = posed(solid, camera) {
-                return scratch.of_posed(&posed, camera);
-            }
-            scratch.of_any(solid, camera)
-        })
-    }
-
-    /// As [`Contours::of`], without trees.
-    #[cfg(test)]
-    pub(in crate::render) fn of_any(solid: &Solid, camera: &Camera) -> Contours {
-        Scratch::default().of_any(solid, camera)
-    }
-
-    /// As [`Contours::of`], with trees.
-    #[cfg(test)]
-    pub(in crate::render) fn of_posed(posed: &[Posed<'_>], camera: &Camera) -> Contours {
-        Scratch::default().of_posed(posed, camera)
+        with_scratch(|scratch| scratch.of_meshes(solid, camera))
     }
 
     /// As [`Contours::of`], with the depth image of the same solid and camera already
@@ -84,13 +62,6 @@ impl Contours {
         let room = || Vec::with_capacity(found + found / 8 + 16);
         let (width, height) = (camera.width, camera.height);
         Contours { x: room(), y: room(), tx: room(), ty: room(), length: room(), width, height }
-    }
-
-    /// As many pieces, all of them zero.
-    fn with_length(camera: &Camera, count: usize) -> Contours {
-        let list = || vec![0.0; count];
-        let (width, height) = (camera.width, camera.height);
-        Contours { x: list(), y: list(), tx: list(), ty: list(), length: list(), width, height }
     }
 
     /// Adds a visible piece.
@@ -138,8 +109,8 @@ impl Scratch {
         range
     }
 
-    /// The contours of any solid.
-    fn of_any(&mut self, solid: &Solid, camera: &Camera) -> Contours {
+    /// The contours of the solid's meshes.
+    fn of_meshes(&mut self, solid: &Solid, camera: &Camera) -> Contours {
         let range = self.trace(solid, camera);
         let Scratch { projected, looked, pieces, hidden, found, .. } = self;
         hidden.clear();
@@ -172,37 +143,6 @@ impl Scratch {
             camera,
             found,
         )
-    }
-
-    /// The contours of meshes that keep their shape.
-    fn of_posed(&mut self, posed: &[Posed<'_>], camera: &Camera) -> Contours {
-        work::count(|work| work.whole += 1);
-        let Scratch { room, found_faces, hiding, pieces, hidden, found, .. } = self;
-        pieces.clear();
-        let mut range = DepthRange::EMPTY;
-        for posed in posed {
-            range = range.and(&posed.range());
-            if posed.outside {
-                work::count(|work| work.outside += 1);
-                continue;
-            }
-            work::drawn(posed.mesh);
-            let tools = (&mut *found_faces, &mut room.crossed);
-            extract_posed(posed, camera, tools, |piece, _| pieces.push(piece));
-        }
-        hidden.clear();
-        hidden.resize(pieces.len(), true);
-        for side in 0..2 {
-            hiding.test(posed, camera, range.extent(), (side, pieces, hidden));
-        }
-        *found = hidden.iter().filter(|hidden| !**hidden).count();
-        let mut out = Contours::with_length(camera, *found);
-        let lists = out.x.iter_mut().zip(&mut out.y).zip(&mut out.tx).zip(&mut out.ty);
-        let visible = pieces.iter().zip(&*hidden).filter(|(_, hidden)| !**hidden);
-        for (((((x, y), tx), ty), length), (piece, _)) in lists.zip(&mut out.length).zip(visible) {
-            (*x, *y, *tx, *ty, *length) = (piece.x, piece.y, piece.tx, piece.ty, piece.length);
-        }
-        out
     }
 }
 

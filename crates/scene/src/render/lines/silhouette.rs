@@ -172,33 +172,6 @@ impl Crossed {
         }
     }
 
-    /// As [`Crossed::each`] for a mesh that is beyond the near plane, with the faces already
-    /// found: the corners of each, the one whose sign differs first.
-    #[inline(always)]
-    pub fn each_of(
-        &mut self,
-        found: &[[u32; 3]],
-        mesh: &Mesh,
-        placement: &Placement,
-        lens: &Lens,
-        mut out: impl FnMut(&Batch, usize),
-    ) {
-        let batch = &mut self.batch;
-        for found in found.chunks(MOST) {
-            for (i, corners) in found.iter().enumerate() {
-                batch.place(i, *corners, mesh);
-            }
-            let count = found.len();
-            match count.div_ceil(FEW) {
-                1 => batch.project_and_work::<FEW>(placement, lens, count),
-                2 => batch.project_and_work::<{ 2 * FEW }>(placement, lens, count),
-                3 => batch.project_and_work::<{ 3 * FEW }>(placement, lens, count),
-                _ => batch.project_and_work::<MOST>(placement, lens, count),
-            }
-            out(batch, count);
-        }
-    }
-
     /// Finds the faces whose corners do not all have the same sign of facing.
     #[inline(always)]
     fn find(&mut self, topology: &Topology, front: &[u8]) {
@@ -276,18 +249,6 @@ impl Batch {
         vertices: &Vertices<'_>,
         facing: &[f64],
     ) {
-        self.place(i, corners, mesh);
-        for (k, v) in corners.into_iter().enumerate() {
-            let (at, point) = (v as usize, vertices.point(v));
-            [self.image[k][0][i], self.image[k][1][i], self.image[k][2][i]] =
-                [point.x, point.y, point.nearness];
-            self.facing[k][i] = facing.get(at).copied().unwrap_or_default();
-        }
-    }
-
-    /// Sets the corners of a face, in the mesh's coordinates alone.
-    #[inline(always)]
-    fn place(&mut self, i: usize, corners: [u32; 3], mesh: &Mesh) {
         self.corners[i] = corners;
         for (k, v) in corners.into_iter().enumerate() {
             let [p, n] = [&mesh.positions, &mesh.normals]
@@ -296,39 +257,11 @@ impl Batch {
                 (self.positions[k][axis][i], self.normals[k][axis][i]) = (p[axis], n[axis]);
             }
         }
-    }
-
-    /// Projects the corners of the first `N` faces, then as [`Batch::work`].
-    #[inline(always)]
-    fn project_and_work<const N: usize>(
-        &mut self,
-        placement: &Placement,
-        lens: &Lens,
-        count: usize,
-    ) {
-        match lens.pinhole {
-            true => self.project::<N, true>(placement, lens),
-            false => self.project::<N, false>(placement, lens),
-        }
-        self.work::<N>(placement, lens, count, true);
-    }
-
-    /// Computes the facing and the image of the corners, as for whole meshes.
-    #[inline(always)]
-    fn project<const N: usize, const PINHOLE: bool>(&mut self, placement: &Placement, lens: &Lens) {
-        let lens = Lens { pinhole: PINHOLE, ..*lens };
-        let (rows, (view, bend)) = (placement.rows(), placement.sight());
-        let Batch { positions, normals, facing, image, .. } = self;
-        for (((p, n), facing), image) in positions.iter().zip(normals).zip(facing).zip(image) {
-            for i in 0..N {
-                let [px, py, pz] = [p[0][i], p[1][i], p[2][i]];
-                facing[i] = n[0][i] * (view.x - px * bend)
-                    + n[1][i] * (view.y - py * bend)
-                    + n[2][i] * (view.z - pz * bend);
-                let [x, y, z] = rows.map(|[a, b, c, t]| px * a + py * b + pz * c + t);
-                let point = lens.point(DVec3::new(x, y, z)).single();
-                (image[0][i], image[1][i], image[2][i]) = (point.x, point.y, point.nearness);
-            }
+        for (k, v) in corners.into_iter().enumerate() {
+            let (at, point) = (v as usize, vertices.point(v));
+            [self.image[k][0][i], self.image[k][1][i], self.image[k][2][i]] =
+                [point.x, point.y, point.nearness];
+            self.facing[k][i] = facing.get(at).copied().unwrap_or_default();
         }
     }
 

@@ -264,15 +264,6 @@ impl<'a> Depths<'a> {
         self.visible_by(piece, 0) || self.visible_by(piece, 1)
     }
 
-    /// The pixel of a piece's test on the first or the second side, and the least depth there
-    /// at which it passes.
-    #[inline]
-    pub fn least_by(&self, piece: &Piece, side: usize) -> Option<(u32, f64)> {
-        let own = piece.sides.get(side).filter(|side| side.pixel != NOWHERE)?;
-        let most = self.most[usize::from(piece.edge)];
-        Some((own.pixel, self.threshold([piece.depth, own.slack, most], own.inside)))
-    }
-
     /// Whether a piece passes its test on the first or the second side.
     #[inline]
     pub fn visible_by(&self, piece: &Piece, side: usize) -> bool {

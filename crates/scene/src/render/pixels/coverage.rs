@@ -113,26 +113,6 @@ impl Coverage {
         [edge(a, b), edge(b, c), edge(c, a)]
     }
 
-    /// Whether it covers a pixel.
-    #[inline(always)]
-    pub fn covers(&self, points: &[Point; 3], column: usize, row: usize) -> bool {
-        let Coverage { columns, rows, .. } = *self;
-        if !(columns[0]..columns[1]).contains(&column) || !(rows[0]..rows[1]).contains(&row) {
-            return false;
-        }
-        let (corners, at) = (self.corners(points), [centre(column), centre(row)]);
-        match is_small(&corners) {
-            true => {
-                let [a, b, c] = self.edges(corners, [i64::from(at[0]), i64::from(at[1])]);
-                (a[0] | b[0] | c[0]) >= 0
-            }
-            false => {
-                let corners = corners.map(|p| p.map(i128::from));
-                self.edges(corners, at.map(i128::from)).iter().all(|edge| edge[0] >= 0)
-            }
-        }
-    }
-
     /// The corners in units.
     #[inline(always)]
     fn corners(&self, points: &[Point; 3]) -> [[i64; 2]; 3] {

@@ -129,23 +129,6 @@ impl Placement {
         [0, 1, 2].map(|r| [m.x_axis[r], m.y_axis[r], m.z_axis[r], t[r]])
     }
 
-    /// The linear part.
-    pub fn matrix(&self) -> DMat3 {
-        self.m
-    }
-
-    /// Where the mesh's origin is.
-    pub fn shift(&self) -> DVec3 {
-        self.t
-    }
-
-    /// `view` and `bend` in `facing = n . (view - bend * p)`, for a vertex p of the mesh with
-    /// normal n: positive where it faces the camera.
-    #[inline(always)]
-    pub fn sight(&self) -> (DVec3, f64) {
-        (self.view, self.bend)
-    }
-
     /// Transforms a normal of the mesh to camera coordinates: outward, not of unit
     /// length.
     #[inline(always)]

@@ -179,29 +179,6 @@ impl Triangle {
         });
     }
 
-    /// The nearness that [`Triangle::within`] draws at one pixel; `None` if it draws nothing
-    /// there.
-    #[inline(always)]
-    pub fn nearness_at(
-        points: &[Point; 3],
-        places: [Place; 3],
-        (size, back): (Vec4, f64),
-        [column, row]: [usize; 2],
-    ) -> Option<f32> {
-        let extent = Extent::around(places, size);
-        if extent.is_empty() {
-            return None;
-        }
-        let coverage = Coverage::new(places, || *points, extent, back)?;
-        if !coverage.covers(points, column, row) {
-            return None;
-        }
-        let plane = Plane::new(points, coverage.columns[0])?;
-        let Plane { step, origin, limits, .. } = plane;
-        let (from, to, nearness) = (column, column + 1, plane.row(row));
-        Some(Run { row, from, to, nearness, step, origin, limits }.nearness(column))
-    }
-
     /// Merges the triangle into the rows of an area, keeping the nearer value. With a set
     /// of marked pixels, only these are sure to be drawn, and the area must be the whole
     /// image.

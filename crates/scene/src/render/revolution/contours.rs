@@ -1,6 +1,6 @@
 //! The visible contours of a surface of revolution.
 
-use super::drawer::{Drawer, Source};
+use super::drawer::Drawer;
 use super::rays::Spans;
 use super::samples::Samples;
 use super::sight::Sight;
@@ -35,32 +35,14 @@ impl Contours {
             return Contours::new(camera.width, camera.height);
         };
         SCRATCH.with(|scratch| match scratch.try_borrow_mut() {
-            Ok(mut scratch) => scratch.contours(surface, &sight, camera, None),
-            Err(_) => Scratch::default().contours(surface, &sight, camera, None),
+            Ok(mut scratch) => scratch.contours(surface, &sight, camera),
+            Err(_) => Scratch::default().contours(surface, &sight, camera),
         })
-    }
-
-    /// Calls `f` with the samples of the contours and where each piece comes from.
-    pub(super) fn sources(
-        surface: &Revolution,
-        sight: &Sight,
-        camera: &Camera,
-        f: impl FnOnce(&Samples, &[Source]),
-    ) {
-        let (mut scratch, mut sources) = (Scratch::default(), Vec::new());
-        scratch.contours(surface, sight, camera, Some(&mut sources));
-        f(&scratch.samples, &sources);
     }
 }
 
 impl Scratch {
-    fn contours(
-        &mut self,
-        surface: &Revolution,
-        sight: &Sight,
-        camera: &Camera,
-        sources: Option<&mut Vec<Source>>,
-    ) -> Contours {
+    fn contours(&mut self, surface: &Revolution, sight: &Sight, camera: &Camera) -> Contours {
         let range = sight.range(surface);
         let out = Contours::with_room(camera, self.found);
         if !(range.far > Camera::NEAR && range.far < HUGE) {
@@ -93,7 +75,6 @@ impl Scratch {
                     size,
                     count: 0,
                     out,
-                    sources,
                 };
                 drawer.silhouettes();
                 drawer.rims();

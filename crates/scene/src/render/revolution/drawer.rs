@@ -17,20 +17,6 @@ use crate::render::pixels::place::Point;
 use crate::render::pixels::project::beyond_near;
 use glam::DVec3;
 
-/// Where a piece comes from.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Source {
-    /// The number of the sample where its chord begins.
-    pub sample: usize,
-    /// 0 for the side of positive z, 1 for the other.
-    pub side: usize,
-    /// The position of the piece's middle along the chord, and the share that it covers.
-    pub at: f64,
-    pub share: f64,
-    /// Whether the chord reaches from sample to sample: it is not cut at the near plane.
-    pub whole: bool,
-}
-
 /// Draws the contours of a surface from samples of its curves.
 pub(super) struct Drawer<'a> {
     pub surface: &'a Revolution,
@@ -48,8 +34,6 @@ pub(super) struct Drawer<'a> {
     /// The number of pieces in `out`, whose lists are longer.
     pub count: usize,
     pub out: Contours,
-    /// Where the pieces come from, if somebody asks.
-    pub sources: Option<&'a mut Vec<Source>>,
 }
 
 /// Pieces to be tested for visibility: middle, depth, unit tangent, and how much nearer
@@ -208,9 +192,6 @@ impl Drawer<'_> {
             if any(&visible) {
                 self.add(near, &visible);
                 self.add(far, &visible);
-                if self.sources.is_some() {
-                    self.note(first, &visible);
-                }
             }
         }
         for (side, chords) in sides.iter().enumerate() {
@@ -334,22 +315,6 @@ impl Drawer<'_> {
         self.write([&x, &y, &tx, &ty, &length], count);
     }
 
-    /// Notes where chords that are single visible pieces come from.
-    #[inline(never)]
-    fn note(&mut self, first: usize, visible: &Mask) {
-        let Some(sources) = &mut self.sources else { return };
-        for side in 0..2 {
-            let seen = (0..LANES).filter(|i| visible[*i] != 0);
-            sources.extend(seen.map(|i| Source {
-                sample: first + i,
-                side,
-                at: 0.5,
-                share: 1.0,
-                whole: true,
-            }));
-        }
-    }
-
     /// Adds the first `count` of some pieces.
     #[inline(always)]
     fn write(&mut self, rows: [&[f32; LANES]; 5], count: usize) {
@@ -426,10 +391,6 @@ impl Drawer<'_> {
                 let values = [at[0], at[1], tangent[0], tangent[1], length / count];
                 let rows = values.map(|v| [v as f32; LANES]);
                 self.write(rows.each_ref(), 1);
-                let whole = self.whole;
-                if let Some(sources) = &mut self.sources {
-                    sources.push(Source { sample: first + i, side, at: t, share: step, whole });
-                }
             }
         }
     }

@@ -74,27 +74,6 @@ impl Scratch {
     }
 }
 
-/// Calls `f` for each pixel that shows a surface, with its number, its depth and the number
-/// of the span.
-pub(super) fn each_seen(
-    surface: &Revolution,
-    sight: &Sight,
-    camera: &Camera,
-    mut f: impl FnMut(usize, f64, usize),
-) {
-    let mut tracer = Tracer::default();
-    tracer.rows(surface, sight, camera, |scan, row| {
-        let [from, past] = scan.window();
-        for at in (0..past - from).step_by(LANES) {
-            let seen = scan.seen(at);
-            let here = (from + at..past).zip(seen.depth).zip(seen.span);
-            for ((column, depth), span) in here.filter(|((_, depth), _)| depth.is_finite()) {
-                f(row * camera.width as usize + column, depth, span as usize);
-            }
-        }
-    });
-}
-
 /// Follows lines of sight, row by row.
 #[derive(Default)]
 struct Tracer {

@@ -179,7 +179,7 @@ fn what_goes_up_and_down_again_inside_encloses_a_body() {
     let walls = |r: [f64; 3], thickness: f64, caps: Caps| {
         let part = Profile { y: vec![-1.0, 0.2, 0.9], r: r.to_vec() };
         let wall = crate::geom::Wall { thickness, floor: 0.3 };
-        Revolution::lathe(&[part], wall, caps).unwrap().encloses()
+        Vessel { parts: vec![part], wall, caps }.exact().encloses()
     };
     for r in [[0.4, 0.8, 0.3], [0.0, 0.5, 0.0], [0.9, 0.1, 0.9]] {
         assert!(walls(r, 0.0, Caps::Both), "{r:?}");

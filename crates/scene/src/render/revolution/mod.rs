@@ -8,12 +8,11 @@
 //!
 //! `sight` has the camera and the surface in each other's coordinates, `silhouettes` makes
 //! curves (`samples`), `chords` orients their pieces, `rays` decides what is visible, `drawer`
-//! puts this together, and `contours`, `frame` and `derivative` are what others call.
+//! puts this together, and `contours` and `frame` are what others call.
 
 mod chords;
 mod contours;
 mod cover;
-mod derivative;
 mod drawer;
 mod frame;
 mod lanes;
@@ -23,9 +22,8 @@ mod scan;
 mod shading;
 mod sight;
 mod silhouettes;
-mod vertices;
-
-pub use derivative::RevolutionGradient;
 
 #[cfg(test)]
 mod testing;
+#[cfg(test)]
+mod view_tests;

@@ -152,16 +152,6 @@ impl Sight {
         lines
     }
 
-    /// The origin and the way of the line of sight through a position in the image.
-    pub fn line(&self, [x, y]: [f64; 2]) -> (DVec3, DVec3) {
-        let at = [&[x; LANES], &[y; LANES]];
-        let Lines { origin, way } = match self.lens.pinhole {
-            true => self.lines::<true>(at),
-            false => self.lines::<false>(at),
-        };
-        (DVec3::from(origin.map(|row| row[0])), DVec3::from(way.map(|row| row[0])))
-    }
-
     /// What all lines of sight share: the origin from a pinhole, or else the way.
     #[inline(always)]
     pub fn shared<const PINHOLE: bool>(&self) -> [Row; 3] {

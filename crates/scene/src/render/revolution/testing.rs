@@ -1,6 +1,6 @@
 //! Random vessels and poses for this module's tests.
 
-use crate::geom::{Affine, Caps, Profile, Revolution, Solid, Wall};
+use crate::geom::{Affine, Caps, Profile, Revolution, Solid, Wall, lathe};
 use crate::render::testing::Uniform;
 use glam::DVec3;
 
@@ -44,11 +44,12 @@ impl Vessel {
     }
 
     pub fn mesh(&self, sides: u32) -> Solid {
-        Solid::lathe(&self.parts, sides, self.wall, self.caps).unwrap()
+        Solid::new(lathe(&self.parts, sides, self.wall, self.caps).unwrap().into())
     }
 
     pub fn exact(&self) -> Revolution {
-        Revolution::lathe(&self.parts, self.wall, self.caps).unwrap()
+        let solid = Solid::exact_lathe(&self.parts, 96, self.wall, self.caps).unwrap();
+        Revolution::clone(&solid.revolution().unwrap().surface)
     }
 }
 
