@@ -3,9 +3,8 @@
 use super::args::Contours;
 use pcadlang_library::scene::DetectorValue;
 use pcadlang_report::pictures::png;
-use pcadlang_runs::edges;
 use pcadlang_runs::failure::{Failure, plain};
-use pcadlang_runs::files;
+use pcadlang_runs::{files, inputs};
 use pcadlang_scene::vision::{FileDetector, GradientDetector};
 
 /// Detects the contours of a photograph and writes them as a map.
@@ -17,7 +16,7 @@ pub fn contours(a: &Contours) -> Result<(), Failure> {
             GradientDetector { size: a.size.unwrap_or(by.size), ..by }.contours(&photo)
         }
         Some(spec) => {
-            let DetectorValue(detector) = edges::detector(spec)?;
+            let DetectorValue(detector) = inputs::detector(spec)?;
             let detector = detector.ok_or_else(|| plain(format!("{spec} is not a detector")))?;
             let size = a.size.unwrap_or(FileDetector::SIZE);
             if size > FileDetector::MOST {

@@ -15,7 +15,7 @@ pub use entry::Entry;
 pub use pcadlang_engine::lang::adjoint::Adjoint;
 #[doc(inline)]
 pub use pcadlang_engine::lang::builtins::data::{
-    Beside, DataFormat, Literal, Options as DataOptions,
+    DataFormat, Literal, Options as DataOptions, ReadRelative,
 };
 #[doc(inline)]
 pub use pcadlang_engine::lang::builtins::{Args, Defaults, Domain, InputHook, Type};

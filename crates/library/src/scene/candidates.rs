@@ -22,12 +22,12 @@ pub(super) const TABLE: &[Row] = &[native(
             IMAGE,
             "The photograph; from a contour map alone, the enclosed regions are used.",
         ),
-        int("most", 20, [1, 64], "The maximum number of candidates, 1 to 64."),
+        int("most", 20, [1, 64], "The maximum number of candidates."),
         int(
             "size",
             128,
             [32, 512],
-            "The longer side of the picture that is analysed, 32 to 512; 256 for a contour map.",
+            "The longer side of the picture that is analysed; 256 for a contour map.",
         )
         .unit("pixels"),
         opt("camera", CAMERA, "the run's", "The camera; by default, that of the run."),

@@ -2,7 +2,6 @@
 
 use super::adjoints::BySolid;
 use super::observed::{DepthValue, ImageValue, MaskValue};
-use super::shared_tally::SharedTally;
 use super::{VIEW, ViewValue, incremental, native};
 use pcadlang_engine::lang::adjoint::Adjoint;
 use pcadlang_engine::lang::builtins::{
@@ -11,7 +10,7 @@ use pcadlang_engine::lang::builtins::{
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_engine::lang::value::{Likelihood, Object, Value};
 use pcadlang_numerics::rng::Stream;
-use pcadlang_scene::render::{Camera, Frame, View};
+use pcadlang_scene::render::{Camera, Channel, Frame, View};
 use pcadlang_scene::vision::chamfer::{self, Mode};
 use pcadlang_scene::vision::contour_ratio;
 use pcadlang_scene::vision::{
@@ -20,13 +19,14 @@ use pcadlang_scene::vision::{
 };
 use std::cell::{OnceCell, RefCell};
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
 pub(super) const SECTION: &str = "Comparing";
 pub(super) const SEEN: Arg = arg("view", VIEW, "The view.");
 pub(super) const SIZE: Arg =
-    int("size", 128, [8, 4096], "The longer side of the rendered picture, 8 to 4096.")
-        .unit("pixels");
+    int("size", 128, [8, 4096], "The longer side of the rendered picture.").unit("pixels");
+
+const RATIO: ContourRatioOptions = ContourRatioOptions::USUAL;
 
 pub(super) const TABLE: &[Row] = &[
     incremental(
@@ -35,13 +35,13 @@ pub(super) const TABLE: &[Row] = &[
         &[
             SEEN,
             SIZE,
-            num("foreground", 0.75, "The fraction of rendered contour that produces an observed edge."),
-            num("sd", 0.4, "The standard deviation of its distance to that edge.")
+            num("foreground", RATIO.foreground, "The fraction of rendered contour that produces an observed edge."),
+            num("sd", RATIO.sd, "The standard deviation of its distance to that edge.")
                 .unit("percent of the diagonal"),
-            num("truncate", 3.3, "The distance beyond which an edge is not matched.")
+            num("truncate", RATIO.truncate, "The distance beyond which an edge is not matched.")
                 .unit("percent of the diagonal"),
-            num("credit", 2.0, "The number of times that one observed edge can be matched."),
-            num("weight", 0.5, "The power of the likelihood ratio per two pixels of contour, in a picture of 256 pixels."),
+            num("credit", RATIO.credit, "The number of times that one observed edge can be matched."),
+            num("weight", RATIO.weight, "The power of the likelihood ratio per two pixels of contour, in a picture of 256 pixels."),
         ],
         Type::Likelihood,
         "The likelihood ratio of the observed contours: object against clutter. The default for photographs.",
@@ -53,7 +53,7 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             SEEN,
-            num("sigma", 0.4, "The standard deviation of the distance.").positive().unit("percent of the diagonal"),
+            num("sigma", ChamferOptions::USUAL.sigma, "The standard deviation of the distance.").positive().unit("percent of the diagonal"),
             word("mode", &["mean", "sum"], "\"mean\": one term for the mean distance, as in the paper; \"sum\": one term per percent of contour."),
             flag("symmetric", "Also measures from the observed to the rendered contours."),
             opt("truncate", Type::Num, "none", "Truncates distances at this value.").unit("percent of the diagonal"),
@@ -85,7 +85,9 @@ pub(super) const TABLE: &[Row] = &[
         "The probability of an observed mask: pixels flip independently.",
         |a| {
             let (eps, partial) = ([a.num("eps_in")?, a.num("eps_out")?], a.bool("partial")?);
-            likelihood(MaskOf { view: view(a)?, size: a.int("size")?, eps, partial })
+            let channel = if partial { Channel::Fractions } else { Channel::Depth };
+            let (view, size) = reading(a, channel)?;
+            likelihood(MaskOf { view, size, eps, partial })
         },
     )
     .vjp(|_, _, by| Some(by_view(by.clone(), 4))),
@@ -105,7 +107,7 @@ pub(super) const TABLE: &[Row] = &[
          missing pixels are ignored.",
         |a, previous| {
             let options = [a.num("sd")?, a.num("outlier")?, a.num("near")?, a.num("far")?];
-            let (view, size) = (view(a)?, a.int("size")?);
+            let (view, size) = reading(a, Channel::Depth)?;
             tallying(previous, |tally| DepthOf { view, size, options, tally })
         },
     )
@@ -123,6 +125,43 @@ pub(super) fn likelihood(l: impl Likelihood + 'static) -> Result<Value, Fault> {
 
 pub(super) fn view(a: &Args) -> Result<Arc<View>, Fault> {
     a.object::<ViewValue>(0, "a view").map(|v| Arc::clone(&v.0))
+}
+
+/// The view and the size of the picture that a comparator reads a channel of.
+pub(super) fn reading(a: &Args, channel: Channel) -> Result<(Arc<View>, u32), Fault> {
+    let (view, size) = (view(a)?, a.int("size")?);
+    view.declare(channel, size);
+    Ok((view, size))
+}
+
+/// Sums over the contours that stay, of the comparator that counted them last. Likelihoods
+/// of one node of a trace share them, as their views share a canvas.
+pub(super) struct SharedTally<C, T>(Mutex<(Option<Arc<C>>, T)>);
+
+impl<C, T> fmt::Debug for SharedTally<C, T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("SharedTally")
+    }
+}
+
+impl<C: Send + Sync + 'static, T: Default + Send + 'static> SharedTally<C, T> {
+    /// What the previous evaluation kept. While another thread counts, nothing: forks that
+    /// run side by side would disturb each other.
+    pub fn after(previous: Option<&PreviousEvaluation>) -> Arc<SharedTally<C, T>> {
+        let kept = previous.and_then(|p| Arc::clone(&p.state).downcast::<SharedTally<C, T>>().ok());
+        kept.filter(|kept| !matches!(kept.0.try_lock(), Err(TryLockError::WouldBlock)))
+            .unwrap_or_else(|| Arc::new(SharedTally(Mutex::default())))
+    }
+
+    /// Calls a function with the sums of a comparator, empty ones if they were of another
+    /// one.
+    pub fn with<R>(&self, comparator: &Arc<C>, f: impl FnOnce(&mut T) -> R) -> R {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if !kept.0.as_ref().is_some_and(|of| Arc::ptr_eq(of, comparator)) {
+            *kept = (Some(Arc::clone(comparator)), T::default());
+        }
+        f(&mut kept.1)
+    }
 }
 
 /// A likelihood that shares the sums of the previous evaluation.
@@ -162,9 +201,9 @@ fn contour(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, St
         truncate: a.num("truncate")?,
         credit: a.num("credit")?,
         weight: a.num("weight")?,
-        ..ContourRatioOptions::default()
+        ..RATIO
     };
-    let (view, size) = (view(a)?, a.int("size")?);
+    let (view, size) = reading(a, Channel::Contours)?;
     tallying(previous, |tally| ContourOf { view, size, options, tally })
 }
 
@@ -176,7 +215,7 @@ fn chamfer(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, St
         truncate: a.num_if_given("truncate")?,
         oriented: a.num_if_given("oriented")?,
     };
-    let (view, size) = (view(a)?, a.int("size")?);
+    let (view, size) = reading(a, Channel::Contours)?;
     tallying(previous, |tally| ChamferOf { view, size, options, tally })
 }
 
@@ -220,7 +259,7 @@ pub(super) fn same_shape((w, h): (u32, u32), view: &View, comparator: &str) -> R
 }
 
 thread_local! {
-    static RATIO: RefCell<contour_ratio::Scratch> = RefCell::default();
+    static RATIO_SCRATCH: RefCell<contour_ratio::Scratch> = RefCell::default();
     static CHAMFER: RefCell<chamfer::Scratch> = RefCell::default();
 }
 
@@ -259,7 +298,8 @@ impl Likelihood for ContourOf {
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (ratio, contours) = (self.prepared(observed).ok()?, self.view.contours(self.size));
         let mut by_piece = Vec::new();
-        RATIO.with_borrow_mut(|scratch| ratio.gradient(&contours.slice(), scratch, &mut by_piece));
+        RATIO_SCRATCH
+            .with_borrow_mut(|scratch| ratio.gradient(&contours.slice(), scratch, &mut by_piece));
         Some(by_contours(&self.view, self.size, &by_piece))
     }
 

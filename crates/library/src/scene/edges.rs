@@ -15,14 +15,14 @@ pub(super) const TABLE: &[Row] = &[native(
             "size",
             256,
             [8, 8192],
-            "The longer side of the picture that is analysed, 8 to 8192; with a detector from a \
+            "The longer side of the picture that is analysed; with a detector from a \
              file 512, at most 2048, and ignored by a network of fixed size.",
         )
         .unit("pixels"),
         num(
             "smooth",
             1.6,
-            "The standard deviation of the smoothing, 0.3 to 32: larger values give fewer and \
+            "The standard deviation of the smoothing: larger values give fewer and \
              longer contours. With a detector from a file it smooths the map, by 1.",
         )
         .within(Domain::From([0.3, 32.0]))
@@ -30,7 +30,7 @@ pub(super) const TABLE: &[Row] = &[native(
         num(
             "strength",
             0.4,
-            "The minimum strength of a contour point, 0 to 1: weaker points are more often \
+            "The minimum strength of a contour point: weaker points are more often \
              texture than outline. 0.1 with a structured forest, 0.5 with a network.",
         )
         .within(Domain::From([0.0, 1.0])),

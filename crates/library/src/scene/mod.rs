@@ -23,7 +23,6 @@ mod region;
 mod scene_view;
 mod seeing;
 mod shapes;
-mod shared_tally;
 
 pub use inputs::{CAMERAS, DETECTOR_DEFAULT};
 pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};

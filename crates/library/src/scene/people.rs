@@ -25,9 +25,9 @@ pub(super) const TABLE: &[Row] = &[native(
             "views",
             2,
             [2, 8],
-            "The number of views, 2 to 8: with increasing padding, each also mirrored.",
+            "The number of views: with increasing padding, each also mirrored.",
         ),
-        int("most", 2, [1, 100], "The maximum number of people per view, 1 to 100."),
+        int("most", 2, [1, 100], "The maximum number of people per view."),
         arg(
             "near",
             Type::Array,

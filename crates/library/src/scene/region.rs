@@ -3,17 +3,17 @@
 //! pixel.
 
 use super::compare::{
-    SECTION, SEEN, SIZE, by_silhouette, by_view, drawn, image, tallying, unsuitable, view,
+    SECTION, SEEN, SIZE, SharedTally, by_silhouette, by_view, drawn, image, reading, tallying,
+    unsuitable,
 };
 use super::incremental;
 use super::observed::ImageValue;
-use super::shared_tally::SharedTally;
 use pcadlang_engine::lang::adjoint::Adjoint;
 use pcadlang_engine::lang::builtins::{Args, PreviousEvaluation, Row, State, Type, int, num, word};
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_engine::lang::value::{Likelihood, Value};
 use pcadlang_numerics::rng::Stream;
-use pcadlang_scene::render::{Frame, FrameChange, View};
+use pcadlang_scene::render::{Channel, Frame, FrameChange, View};
 use pcadlang_scene::vision::region::{GroupChange, Quantised, Tally};
 use pcadlang_scene::vision::{Region, RegionOptions};
 use std::cell::RefCell;
@@ -22,19 +22,21 @@ use std::sync::Arc;
 /// The maximum number of groups besides the background; further parts share the last one.
 const MOST_GROUPS: u16 = 15;
 
+const USUAL: RegionOptions = RegionOptions::USUAL;
+
 pub(super) const TABLE: &[Row] = &[incremental(
     "region",
     SECTION,
     &[
         SEEN,
-        num("power", 0.05, "The power of the term for the whole picture."),
-        int("tiles", 8, [0, 64], "The number of tiles along each side of the picture, each with its own colour distribution; 0: none."),
-        num("tile_power", 0.1, "The power of the term for the tiles."),
-        int("colours", 32, [2, 256], "The number of colours the photograph is reduced to, 2 to 256."),
+        num("power", USUAL.power, "The power of the term for the whole picture."),
+        int("tiles", USUAL.tiles, [0, 64], "The number of tiles along each side of the picture, each with its own colour distribution; 0: none."),
+        num("tile_power", USUAL.tile_power, "The power of the term for the tiles."),
+        int("colours", USUAL.colours as u32, [2, 256], "The number of colours the photograph is reduced to."),
         word("groups", &["silhouette", "parts"], "The regions with their own colour distribution, besides the background: \
              \"silhouette\": the object; \"parts\": each of its parts, with all from the 15th on \
              as one."),
-        num("shading", 0.0, "The power of the term for shading, whether brightness follows the normals; 0: off."),
+        num("shading", USUAL.shading, "The power of the term for shading, whether brightness follows the normals; 0: off."),
         SIZE,
     ],
     Type::Likelihood,
@@ -67,10 +69,11 @@ fn region(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, Sta
         tile_power: a.num("tile_power")?,
         colours: a.int("colours")? as usize,
         shading: a.num("shading")?,
-        ..RegionOptions::default()
+        ..USUAL
     };
     let groups = if a.word("groups")? == "parts" { Groups::Parts } else { Groups::Silhouette };
-    let (view, size) = (view(a)?, a.int("size")?);
+    let outline = groups == Groups::Silhouette && options.shading == 0.0;
+    let (view, size) = reading(a, if outline { Channel::Depth } else { Channel::Frame })?;
     tallying(previous, |tally| RegionOf { view, size, groups, options, tally })
 }
 

@@ -28,5 +28,5 @@ pub use batch::{BatchRenderer, ContourBatch, Cores, Scene};
 pub use camera::{Camera, CameraError, Projection};
 pub use pixels::frame::{Channels, Frame, FrameChange};
 pub use pixels::shade::shade;
-pub use view::View;
+pub use view::{Channel, View};
 pub use work::{Work, work};

@@ -56,15 +56,20 @@ pub struct ChamferOptions {
     pub oriented: Option<f64>,
 }
 
+impl ChamferOptions {
+    /// The defaults.
+    pub const USUAL: ChamferOptions = ChamferOptions {
+        sigma: 0.4,
+        mode: Mode::Mean,
+        symmetric: false,
+        truncate: None,
+        oriented: None,
+    };
+}
+
 impl Default for ChamferOptions {
     fn default() -> Self {
-        ChamferOptions {
-            sigma: 0.4,
-            mode: Mode::Mean,
-            symmetric: false,
-            truncate: None,
-            oriented: None,
-        }
+        ChamferOptions::USUAL
     }
 }
 

@@ -50,9 +50,9 @@ fn form_name(name: &str, argument: &str) -> String {
 
 /// A borrowed [`FullName`], for look-ups.
 #[derive(Hash)]
-struct Sought<'a>(&'a str, &'a str);
+struct NameRef<'a>(&'a str, &'a str);
 
-impl Equivalent<FullName> for Sought<'_> {
+impl Equivalent<FullName> for NameRef<'_> {
     fn equivalent(&self, name: &FullName) -> bool {
         self.0 == name.0 && self.1 == name.1
     }
@@ -124,7 +124,7 @@ impl Table {
     /// Returns the index of a built-in; operators are named as they are written, the
     /// prefix ones `neg` and `not`.
     pub fn find(&self, module: &str, name: &str) -> Option<u32> {
-        self.entries.get_index_of(&Sought(module, name)).map(|i| i as u32)
+        self.entries.get_index_of(&NameRef(module, name)).map(|i| i as u32)
     }
 
     /// All of them, in the order of the reference.

@@ -100,7 +100,7 @@ pub(super) const TABLE: &[Row] = &[
             arg("mesh", SOLID, "The mesh, as read by `data m: mesh`."),
             word("from", &["groups", "skeleton"], "\"groups\": a joint for each object or group of the mesh, with its name; \
                  \"skeleton\": `root`, `bone_1`, … along the medial axis of a closed mesh."),
-            int("bones", 16, [1, autorig::MOST_BONES as u32], "The maximum number of joints of a skeleton, 1 to 256."),
+            int("bones", 16, [1, autorig::MOST_BONES as u32], "The maximum number of joints of a skeleton."),
         ],
         ARMATURE,
         "An armature for a mesh without one: a tree with its root at the mesh's centre; its \

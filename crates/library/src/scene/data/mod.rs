@@ -6,7 +6,7 @@ mod options;
 
 use super::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue, SolidValue};
 use pcadlang_engine::lang::builtins::data::{
-    Beside, DataFormat, FILE, Literal, Options, kind, unreadable,
+    DataFormat, FILE, Literal, Options, ReadRelative, kind, unreadable,
 };
 use pcadlang_engine::lang::builtins::{Arg, Default, Row, Type, arg, flag, num, opt, word};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
@@ -20,18 +20,14 @@ use std::sync::Arc;
 
 const SHAPE: &[Arg] = &[
     arg("file", Type::Str, "The path, relative to the program's folder."),
-    word("up", &["y", "x", "z"], "The file's up axis: \"x\", \"y\" or \"z\"; it is rotated to +y."),
+    word("up", &["y", "x", "z"], "The file's up axis; it is rotated to +y."),
     num("unit", 1.0, "The length of the file's unit in scene units: 0.01 for centimetres.")
         .unit("m"),
 ];
 
 const NETWORK: &[Arg] = &[
     opt("file", Type::Str, "none", "The path, relative to the program's folder."),
-    word(
-        "colours",
-        &["rgb", "bgr"],
-        "The order of the network's input channels, \"rgb\" or \"bgr\".",
-    ),
+    word("colours", &["rgb", "bgr"], "The order of the network's input channels."),
     num(
         "white",
         1.0,
@@ -47,7 +43,7 @@ const NETWORK: &[Arg] = &[
         "The output to use as the map: its name, or its number from 1.",
     ),
     flag("logits", "Whether the map holds log odds instead of probabilities."),
-    word("shows", &["contours", "objects"], "What the map shows, \"contours\" or \"objects\"."),
+    word("shows", &["contours", "objects"], "What the map shows."),
 ];
 
 pub(super) const TABLE: &[Row] = &[
@@ -125,7 +121,13 @@ pub(super) const TABLE: &[Row] = &[
 struct Plain(fn(&[u8], &Limits) -> Result<Value, VisionError>);
 
 impl DataFormat for Plain {
-    fn load(&self, file: &str, bytes: &[u8], _: &Options, _: &Beside) -> Result<Value, Fault> {
+    fn load(
+        &self,
+        file: &str,
+        bytes: &[u8],
+        _: &Options,
+        _: &ReadRelative,
+    ) -> Result<Value, Fault> {
         (self.0)(bytes, &Limits::default()).map_err(|e| unreadable(file, &e.to_string()))
     }
 }
@@ -159,7 +161,7 @@ impl DataFormat for DetectorFile {
         file: &str,
         bytes: &[u8],
         options: &Options,
-        _: &Beside,
+        _: &ReadRelative,
     ) -> Result<Value, Fault> {
         let network = options::network(options).map_err(|why| unreadable(file, &why))?;
         FileDetector::read(bytes, &network)
@@ -183,7 +185,7 @@ impl DataFormat for DetectorFile {
 /// A mesh or an armature, in a frame of its own.
 #[derive(Debug)]
 struct Shape {
-    load: fn(&str, &[u8], &FileFrame, &Beside) -> Result<Value, String>,
+    load: fn(&str, &[u8], &FileFrame, &ReadRelative) -> Result<Value, String>,
     example: &'static str,
 }
 
@@ -193,7 +195,7 @@ impl DataFormat for Shape {
         file: &str,
         bytes: &[u8],
         options: &Options,
-        beside: &Beside,
+        beside: &ReadRelative,
     ) -> Result<Value, Fault> {
         options::frame(options)
             .and_then(|frame| (self.load)(file, bytes, &frame, beside))
@@ -209,7 +211,12 @@ impl DataFormat for Shape {
     }
 }
 
-fn mesh(file: &str, bytes: &[u8], frame: &FileFrame, beside: &Beside) -> Result<Value, String> {
+fn mesh(
+    file: &str,
+    bytes: &[u8],
+    frame: &FileFrame,
+    beside: &ReadRelative,
+) -> Result<Value, String> {
     let mesh = match gltf::is_gltf(file, bytes) {
         true => gltf::load(bytes, frame, beside).and_then(gltf::Loaded::mesh),
         false => obj::load_in(bytes, frame),
@@ -223,7 +230,13 @@ fn mesh(file: &str, bytes: &[u8], frame: &FileFrame, beside: &Beside) -> Result<
 struct KeypointsFile;
 
 impl DataFormat for KeypointsFile {
-    fn load(&self, file: &str, bytes: &[u8], _: &Options, _: &Beside) -> Result<Value, Fault> {
+    fn load(
+        &self,
+        file: &str,
+        bytes: &[u8],
+        _: &Options,
+        _: &ReadRelative,
+    ) -> Result<Value, Fault> {
         load_keypoints(file, bytes, None)
     }
 

@@ -7,9 +7,7 @@ use glam::DVec3;
 use pcadlang_engine::lang::builtins::{Args, Default, Row, Type, arg, flag, int, num, word};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
-use pcadlang_scene::geom::{
-    Affine, Caps, Landmark, Profile, Solid, Wall, cuboid, lathe, sphere,
-};
+use pcadlang_scene::geom::{Affine, Caps, Landmark, Profile, Solid, Wall, cuboid, lathe, sphere};
 use std::sync::Arc;
 
 const SECTION: &str = "Shapes";
@@ -28,7 +26,7 @@ pub(super) const TABLE: &[Row] = &[
                  only object."),
             num("thickness", 0.0, "The thickness of the wall, for a vessel open at the top; 0 for a solid body.")
             .unit("scene units"),
-            word("caps", &["both", "bottom", "top", "none"], "Which ends are closed: \"both\", \"bottom\", \"top\" or \"none\"."),
+            word("caps", &["both", "bottom", "top", "none"], "Which ends are closed."),
             num("floor", 0.0, "The height of a vessel's floor, or of its contents, above the lower end: at least the wall thickness.")
             .unit("scene units"),
         ],
@@ -50,7 +48,7 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             arg("radius", Type::Num, "The radius.").unit("scene units"),
-            int("sides", 32, [4, 1024], "The number of meridians, 4 to 1024."),
+            int("sides", 32, [4, 1024], "The number of meridians."),
         ],
         SOLID,
         "A sphere centred at the origin.",

@@ -34,19 +34,24 @@ pub struct ContourRatioOptions {
     pub nothing: f64,
 }
 
+impl ContourRatioOptions {
+    /// The defaults.
+    pub const USUAL: ContourRatioOptions = ContourRatioOptions {
+        foreground: 0.75,
+        sd: 0.4,
+        truncate: 3.3,
+        window: 0.25,
+        credit: 2.0,
+        weight: 0.5,
+        unit: 200.0 / (256.0 * std::f64::consts::SQRT_2),
+        least: 10.0,
+        nothing: 1000.0,
+    };
+}
+
 impl Default for ContourRatioOptions {
     fn default() -> Self {
-        ContourRatioOptions {
-            foreground: 0.75,
-            sd: 0.4,
-            truncate: 3.3,
-            window: 0.25,
-            credit: 2.0,
-            weight: 0.5,
-            unit: 200.0 / (256.0 * std::f64::consts::SQRT_2),
-            least: 10.0,
-            nothing: 1000.0,
-        }
+        ContourRatioOptions::USUAL
     }
 }
 

@@ -2,7 +2,7 @@
 //! `pcadlang doc`, and all of it as Markdown.
 
 use crate::lang::builtins::examples::INCLUDE;
-use crate::lang::builtins::{Argument, Builtin, Kind, Table, Type};
+use crate::lang::builtins::{Argument, Builtin, Domain, Kind, Table, Type};
 use pcadlang_syntax::{Place, STATEMENTS, Statement};
 use std::fmt::Write;
 
@@ -115,9 +115,22 @@ fn result_type(b: &Builtin) -> Option<String> {
     }
 }
 
-/// The type, unit and default of an argument, such as "number, radians, default 0."
+/// The type, domain, unit and default of an argument, such as "number, radians, default 0."
 fn traits(a: &Argument) -> String {
     let mut s = a.ty.to_string();
+    match a.domain {
+        Domain::Any => {}
+        Domain::Positive => s.push_str(" above 0"),
+        Domain::NotNegative => s.push_str(" of at least 0"),
+        Domain::From([low, high]) => drop(write!(s, " from {low} to {high}")),
+        Domain::Between01 => s.push_str(" between 0 and 1"),
+        Domain::Below1 => s.push_str(" from 0 to below 1"),
+        Domain::Whole([low, high]) => drop(write!(s, " from {low} to {high}")),
+        Domain::Words(words) => {
+            let quoted: Vec<String> = words.iter().map(|w| format!("\"{w}\"")).collect();
+            let _ = write!(s, ", {}", quoted.join(" or "));
+        }
+    }
     if !a.unit.is_empty() {
         let _ = write!(s, ", {}", a.unit);
     }
