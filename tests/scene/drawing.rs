@@ -140,7 +140,7 @@ fn contours_and_depth_are_as_they_were() {
 
 #[test]
 fn what_was_drawn_before_changes_nothing() {
-    let (mut random, mut listed) = (Uniform(42), 0);
+    let mut random = Uniform(42);
     for _ in 0..12 {
         let cameras = [camera(&mut random), camera(&mut random)];
         let mut meshes: Vec<_> = (0..3 + random.below(20)).map(|_| part(&mut random)).collect();
@@ -170,7 +170,7 @@ fn what_was_drawn_before_changes_nothing() {
             // What is requested first changes nothing either.
             let depth = (random.next() < 0.3).then(|| view.depth(size));
             let change = (random.next() < 0.5).then(|| view.change(size).count);
-            let colours = (random.next() < 0.5).then(|| view.frame_change(size));
+            let colours = (random.next() < 0.5).then(|| view.frame(size));
             let (here, there) = (view.contours(size), Contours::of(&solid, &camera));
             assert_eq!(bits(&here), bits(&there));
             assert!(change.is_none_or(|count| count == there.len()));
@@ -179,15 +179,8 @@ fn what_was_drawn_before_changes_nothing() {
             // Where all channels were drawn, the depth is in that frame.
             assert_eq!(view.depth(size).depth, frame.depth);
             if let Some(colours) = colours {
-                let here = (frame_bits(&view.frame(size)), colours.as_deref());
                 let there = Frame::render(&solid, &camera, Channels::All);
-                assert_eq!(here.0, frame_bits(&there));
-                for (i, pixel) in here.1.iter().flat_map(|c| c.pixels.iter().enumerate()) {
-                    let change = colours.as_deref().unwrap();
-                    let now = (change.part[i], change.normal[i]);
-                    assert_eq!(now, (there.part[*pixel as usize], there.normal[*pixel as usize]));
-                    listed += 1;
-                }
+                assert_eq!(frame_bits(&colours), frame_bits(&there));
             }
             // A view with a frame uses the depth of that frame.
             let framed = View::new(solid, camera);
@@ -199,7 +192,6 @@ fn what_was_drawn_before_changes_nothing() {
             }
         }
     }
-    assert!(listed > 10_000, "{listed}");
 }
 
 #[test]

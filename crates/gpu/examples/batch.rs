@@ -11,10 +11,10 @@
 #[path = "../tests/scenes/mod.rs"]
 mod scenes;
 
-use pcadlang_gpu::Gpu;
+use pcadlang_gpu::{ContourBatch, Cores, Gpu, Scene};
 use pcadlang_numerics::platform::threads::Pool;
 use pcadlang_scene::geom::{Caps, Solid};
-use pcadlang_scene::render::{BatchRenderer, ContourBatch, Contours, Cores, Scene};
+use pcadlang_scene::render::Contours;
 use pcadlang_scene::vision::{Chamfer, ChamferOptions, ContourMap};
 use scenes::Spread;
 use std::error::Error;

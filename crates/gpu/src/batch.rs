@@ -4,11 +4,11 @@
 //! mesh go is decided in turn.
 
 use crate::layout::{Draw, REVOLUTION, SIDES, Scene as Item};
+use crate::scenes::Scene;
 use crate::topologies::{Place, Topologies};
 use crate::vertices::{Source, Vertices};
 use pcadlang_numerics::platform::threads::Pool;
 use pcadlang_scene::geom::{Revolution, Topology};
-use pcadlang_scene::render::Scene;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 

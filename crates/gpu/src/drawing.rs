@@ -7,9 +7,9 @@ use crate::device::{BINDINGS, Device};
 use crate::layout::{
     DRAWN, Draw, FOR_CPU, MOST_PIECES, NO_ROOM, Outcome, PIECE_BYTES, Params, VERTEX_BYTES,
 };
+use crate::scenes::Scene;
 use crate::topologies::Topologies;
 use pcadlang_numerics::platform::threads::Pool;
-use pcadlang_scene::render::Scene;
 use wgpu::{BufferUsages, SubmissionIndex};
 
 /// Workgroups, each of which draws scene after scene.

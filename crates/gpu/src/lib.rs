@@ -1,7 +1,6 @@
-//! A GPU behind [`BatchRenderer`](pcadlang_scene::render::BatchRenderer): the contours of
-//! many scenes at once, and their scores against one picture ([`Gpu::log_likelihoods`]).
+//! A GPU that draws the contours of many scenes at once ([`Gpu::contours`]), and their scores against one picture ([`Gpu::log_likelihoods`]).
 //!
-//! It is never needed: `Cores` draws the same on the CPU, more exactly. Arithmetic is in
+//! It is never needed: [`Cores`] draws the same on the CPU, more exactly. Arithmetic is in
 //! single precision, so results differ by rounding: pieces by at most 0.02 pixels, and
 //! pieces whose depth test is decided at its margin may be visible in one and hidden in
 //! the other, at most 0.5 % of the length (`tests/equal.rs`). The same scenes on the same
@@ -21,9 +20,11 @@ mod device;
 mod drawing;
 mod layout;
 mod renderer;
+mod scenes;
 mod topologies;
 mod vertices;
 
 pub use device::NoDevice;
 pub use layout::SIDES;
 pub use renderer::Gpu;
+pub use scenes::{ContourBatch, Cores, Scene};

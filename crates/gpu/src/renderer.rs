@@ -4,8 +4,9 @@ use crate::batch::{Batch, TASKS};
 use crate::device::{Device, NoDevice};
 use crate::drawing::{Drawing, Drawn, Sent};
 use crate::layout::Params;
+use crate::scenes::{ContourBatch, Scene};
 use pcadlang_numerics::platform::threads::Pool;
-use pcadlang_scene::render::{BatchRenderer, ContourBatch, Contours, Scene};
+use pcadlang_scene::render::Contours;
 use pcadlang_scene::vision::Chamfer;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -156,9 +157,10 @@ impl Gpu {
     }
 }
 
-impl BatchRenderer for Gpu {
-    /// As the CPU's within the tolerance that this crate states.
-    fn contours(&self, scenes: &[Scene]) -> ContourBatch {
+impl Gpu {
+    /// The contours of each scene, in the order given: as the CPU's within the tolerance that
+    /// this crate states.
+    pub fn contours(&self, scenes: &[Scene]) -> ContourBatch {
         let (mut out, mut end, all) = (ContourBatch::default(), 0, scenes.len());
         self.each(scenes, Params::default(), &[0.0], |scenes, batch, drawn| {
             let on_cpu = |scene: &Scene| Contours::of(&scene.solid, &scene.camera);

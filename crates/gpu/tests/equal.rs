@@ -4,9 +4,9 @@
 mod scenes;
 
 use glam::DVec3;
-use pcadlang_gpu::Gpu;
-use pcadlang_scene::geom::{Affine, Caps, Solid, cuboid};
-use pcadlang_scene::render::{BatchRenderer, Camera, ContourBatch, Cores, Projection, Scene};
+use pcadlang_gpu::{ContourBatch, Cores, Gpu, Scene};
+use pcadlang_scene::geom::{Affine, Caps, Solid, cuboid, sphere};
+use pcadlang_scene::render::{Camera, Projection};
 use pcadlang_scene::vision::{Chamfer, ChamferOptions, ContourMap};
 use scenes::{Difference, Spread, compare};
 use std::error::Error;

@@ -1,9 +1,10 @@
 //! Scenes that tests and the example draw, and how two drawings are compared.
 
 use glam::DVec3;
+use pcadlang_gpu::{ContourBatch, Scene};
 use pcadlang_scene::geom::armature::{Armature, JointPose, Rules, rig_from_json};
-use pcadlang_scene::geom::{Affine, Caps, Profile, Solid, obj};
-use pcadlang_scene::render::{Camera, ContourBatch, ContourSlice, Scene};
+use pcadlang_scene::geom::{Affine, Caps, Profile, Solid, lathe, obj};
+use pcadlang_scene::render::{Camera, ContourSlice};
 use std::error::Error;
 use std::sync::Arc;
 

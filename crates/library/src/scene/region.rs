@@ -13,8 +13,8 @@ use pcadlang_engine::lang::builtins::{Args, PreviousEvaluation, Row, State, Type
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_engine::lang::value::{Likelihood, Value};
 use pcadlang_numerics::rng::Stream;
-use pcadlang_scene::render::{Channel, Frame, FrameChange, View};
-use pcadlang_scene::vision::region::{GroupChange, Quantised, Tally};
+use pcadlang_scene::render::{Channel, Frame, View};
+use pcadlang_scene::vision::region::{Quantised, Tally};
 use pcadlang_scene::vision::{Region, RegionOptions};
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -72,9 +72,16 @@ fn region(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, Sta
         ..USUAL
     };
     let groups = if a.word("groups")? == "parts" { Groups::Parts } else { Groups::Silhouette };
-    let outline = groups == Groups::Silhouette && options.shading == 0.0;
-    let (view, size) = reading(a, if outline { Channel::Depth } else { Channel::Frame })?;
+    let (view, size) = reading(a, channel(groups, &options))?;
     tallying(previous, |tally| RegionOf { view, size, groups, options, tally })
+}
+
+/// The channel that it reads: depth, if it depends on the silhouette only.
+fn channel(groups: Groups, options: &RegionOptions) -> Channel {
+    match groups {
+        Groups::Silhouette if options.shading == 0.0 => Channel::Depth,
+        _ => Channel::Frame,
+    }
 }
 
 thread_local! {
@@ -84,7 +91,7 @@ thread_local! {
 impl RegionOf {
     /// Whether the likelihood depends on the silhouette only.
     fn outline(&self) -> bool {
-        self.groups == Groups::Silhouette && self.options.shading == 0.0
+        channel(self.groups, &self.options) == Channel::Depth
     }
 
     /// Returns the observed colours, prepared at the rendered size.
@@ -112,22 +119,10 @@ impl RegionOf {
         groups.clear();
         match self.groups {
             Groups::Silhouette => groups.extend(frame.mask().map(u8::from)),
-            Groups::Parts => self.fill_parts(&frame.part, groups),
-        }
-    }
-
-    /// Computes the group of some pixels, given their parts.
-    fn fill_parts(&self, parts: &[u16], groups: &mut Vec<u8>) {
-        groups.clear();
-        match self.groups {
-            Groups::Silhouette => groups.extend(parts.iter().map(|p| u8::from(*p != u16::MAX))),
-            Groups::Parts => groups.extend(parts.iter().map(|p| group(*p))),
+            Groups::Parts => groups.extend(frame.part.iter().map(|p| group(*p))),
         }
     }
 }
-
-/// What counts a picture's groups and normals.
-type Count<'a> = &'a mut dyn FnMut(&[u8], &[[f32; 3]]);
 
 impl Likelihood for RegionOf {
     fn name(&self) -> &'static str {
@@ -140,26 +135,11 @@ impl Likelihood for RegionOf {
 
     fn log_density(&self, observed: &Value) -> Result<f64, Fault> {
         let region = self.region(observed)?;
-        let change = if self.outline() { None } else { self.view.frame_change(self.size) };
-        let following = |tally: &mut Tally, change: &FrameChange, groups: &mut Vec<u8>| {
-            let FrameChange { from, to, pixels, part, normal } = change;
-            self.fill_parts(part, groups);
-            let change = GroupChange { from, to, pixels, groups, normals: normal };
-            let whole = |count: Count| {
-                let (frame, mut groups) = (self.frame(), Vec::new());
-                self.fill(&frame, &mut groups);
-                count(&groups, &frame.normal);
-            };
-            region.log_likelihood_following(&change, whole, tally)
-        };
         Ok(GROUPS.with_borrow_mut(|groups| {
-            self.tally.with(&region, |tally| match &change {
-                Some(change) => following(tally, change, groups),
-                None => {
-                    let frame = self.frame();
-                    self.fill(&frame, groups);
-                    region.log_likelihood_after(groups, &frame.normal, tally)
-                }
+            self.tally.with(&region, |tally| {
+                let frame = self.frame();
+                self.fill(&frame, groups);
+                region.log_likelihood_after(groups, &frame.normal, tally)
             })
         }))
     }

@@ -4,7 +4,6 @@
 //! in this module draws random numbers, and the same input gives the same output on every
 //! machine.
 
-mod batch;
 mod camera;
 mod camera_json;
 mod canvas;
@@ -24,9 +23,8 @@ mod testing;
 use pcadlang_numerics::num::simd;
 
 pub use crate::contours::{ContourChange, ContourSlice, Contours};
-pub use batch::{BatchRenderer, ContourBatch, Cores, Scene};
 pub use camera::{Camera, CameraError, Projection};
-pub use pixels::frame::{Channels, Frame, FrameChange};
+pub use pixels::frame::{Channels, Frame};
 pub use pixels::shade::shade;
 pub use view::{Channel, View};
 pub use work::{Work, work};

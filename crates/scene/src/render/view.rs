@@ -6,7 +6,7 @@
 
 use super::canvas::Canvas;
 use super::pixels::fractions::Fractions;
-use super::{Camera, Channels, ContourChange, Contours, Frame, FrameChange};
+use super::{Camera, Channels, ContourChange, Contours, Frame};
 use crate::geom::Solid;
 use glam::DVec3;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -28,8 +28,6 @@ pub enum Channel {
 #[derive(Default)]
 struct Pictures {
     frame: OnceLock<Arc<Frame>>,
-    /// `None` where the picture is better drawn in full.
-    frame_change: OnceLock<Option<Arc<FrameChange>>>,
     depth: OnceLock<Arc<Frame>>,
     fractions: OnceLock<Arc<Fractions>>,
     contours: OnceLock<Arc<Contours>>,
@@ -115,28 +113,8 @@ impl View {
 
     /// All channels of the picture whose longer side has `size` pixels (0 counts as 1).
     pub fn frame(&self, size: u32) -> Arc<Frame> {
-        let pictures = self.of(size);
-        let draw = || {
-            let camera = self.camera.scaled_to(size);
-            let on_canvas = pictures.frame_change.get().is_some_and(Option::is_some);
-            let kept = on_canvas.then(|| self.canvas.frame(&self.solid, &camera)).flatten();
-            Arc::new(kept.unwrap_or_else(|| drawn_frame(&self.solid, &camera, Channels::All)))
-        };
-        Arc::clone(pictures.frame.get_or_init(draw))
-    }
-
-    /// The difference of [`View::frame`] from the frame drawn last on the same canvas, without
-    /// building the frame; `None` if the picture is better drawn in full.
-    pub fn frame_change(&self, size: u32) -> Option<Arc<FrameChange>> {
-        let pictures = self.of(size);
-        let draw = || {
-            // The canvas has meshes only.
-            if self.solid.revolution().is_some() || pictures.frame.get().is_some() {
-                return None;
-            }
-            self.canvas.frame_change(&self.solid, &self.camera.scaled_to(size)).map(Arc::new)
-        };
-        pictures.frame_change.get_or_init(draw).clone()
+        let draw = || drawn_frame(&self.solid, &self.camera.scaled_to(size), Channels::All).into();
+        Arc::clone(self.of(size).frame.get_or_init(draw))
     }
 
     /// A frame with depth at least, in the picture whose longer side has `size` pixels (0

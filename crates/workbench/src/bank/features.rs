@@ -2,11 +2,10 @@
 
 use super::{BankError, command};
 use pcadlang_engine::lang::value::Value;
-pub use pcadlang_inference::in_parallel;
 use pcadlang_library::Model;
 use pcadlang_library::scene::{ImageValue, KeypointsValue, ViewValue};
 use pcadlang_report::pictures::shaded;
-use pcadlang_scene::render::{BatchRenderer, Scene, View};
+use pcadlang_scene::render::View;
 use pcadlang_scene::vision::features::{self, Query};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -63,34 +62,6 @@ impl Features {
                 command::features(command, &shaded(&view.frame(*size)))
             }
         }
-    }
-
-    /// Computes the features of the pictures of many scenes, in order; contours are
-    /// rendered as one batch.
-    ///
-    /// # Errors
-    /// As [`Features::of`].
-    pub(super) fn of_all(
-        &self,
-        views: Vec<Arc<View>>,
-        threads: usize,
-        renderer: &dyn BatchRenderer,
-    ) -> Vec<Result<Vec<f32>, BankError>> {
-        let Features::Contours { size } = self else {
-            return in_parallel(threads, views, |view| self.of(&view));
-        };
-        let scenes: Vec<Scene> = views
-            .iter()
-            .map(|view| Scene {
-                solid: view.solid().clone(),
-                camera: view.camera().scaled_to(*size),
-            })
-            .collect();
-        let batch = renderer.contours(&scenes);
-        in_parallel(threads, (0..batch.len()).collect(), |i| {
-            let elements = batch.scene(i);
-            Ok(features::contour_features(&features::rendered(&elements)))
-        })
     }
 
     /// Returns the same features with the names of the scene's landmarks filled in.

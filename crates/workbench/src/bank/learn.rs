@@ -9,7 +9,7 @@ use pcadlang_engine::trace::{Draws, Trace};
 pub use pcadlang_inference::{attempts, in_parallel};
 use pcadlang_library::Model;
 use pcadlang_numerics::rng::{Purpose, StreamKey};
-use pcadlang_scene::render::{Cores, View};
+use pcadlang_scene::render::View;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -55,7 +55,6 @@ pub fn learn(model: &Model, how: &Learn, path: &Path, done: &AtomicU64) -> Resul
     let (_, first) = one(&prior, operand, how, 0)?;
     let features = how.features.clone().named(&first);
     let mut writer = BankWriter::create(path, how.count, how.features.of(&first)?.len())?;
-    let renderer = Cores::new(how.threads);
     let (mut from, end) = (how.first, how.first + how.count);
     while from < end {
         let to = (from + BLOCK).min(end);
@@ -67,7 +66,7 @@ pub fn learn(model: &Model, how: &Learn, path: &Path, done: &AtomicU64) -> Resul
         let scenes: Result<Vec<_>, BankError> =
             in_parallel(how.threads, (from..to).collect(), draw).into_iter().collect();
         let (latents, views): (Vec<_>, Vec<_>) = scenes?.into_iter().unzip();
-        let found = how.features.of_all(views, how.threads, &renderer);
+        let found = in_parallel(how.threads, views, |view| how.features.of(&view));
         let entries: Result<Vec<Entry>, BankError> = latents
             .into_iter()
             .zip(found)

@@ -33,8 +33,6 @@ impl PlacedLayer {
 #[derive(Default)]
 pub struct DynamicMesh {
     pub index: usize,
-    /// The number of its first part among those of the solid.
-    pub first_part: u16,
     pub now: PlacedLayer,
     before: PlacedLayer,
     /// The pieces of the current layer that are visible.
@@ -53,12 +51,11 @@ impl DynamicMesh {
     /// or the previous one fits. Nothing is drawn of a mesh that `behind` hides.
     pub fn move_to(
         &mut self,
-        Member { instance, first_part, .. }: &Member<'_>,
+        Member { instance, .. }: &Member<'_>,
         (camera, shows): (&Camera, Shows),
         tools: &mut Tools,
         behind: Option<&StaticLayer>,
     ) {
-        self.first_part = *first_part;
         let affine = affine_bits(&instance.affine);
         let is_it = |own: &PlacedLayer| {
             let hides = |known| behind.is_some_and(|b| Arc::ptr_eq(known, &b.prepared));

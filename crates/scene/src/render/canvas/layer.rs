@@ -1,5 +1,5 @@
 //! The contribution of one mesh to a picture: its depth in a rectangle, its pieces of
-//! contour before any is hidden or its parts and normals, its depth range.
+//! contour before any is hidden, its depth range.
 //!
 //! Invariant: a layer is a function of mesh, placement and camera alone, and 1 / q falls
 //! as q grows, in `f32` too, so the nearest of the layers' depths is the depth of a full
@@ -10,7 +10,7 @@ use crate::render::lines::extraction::{Room, extract_mesh};
 use crate::render::lines::visibility::{BESIDE, Piece};
 use crate::render::pixels::area::Area;
 use crate::render::pixels::candidates::Candidates;
-use crate::render::pixels::frame::{ChannelPixels, Shading, to_depth};
+use crate::render::pixels::frame::to_depth;
 use crate::render::pixels::project::{DepthRange, Lens, Placement, Projected};
 use crate::render::pixels::raster::draw_mesh;
 use crate::render::{Camera, Projection, work};
@@ -20,7 +20,6 @@ use crate::render::{Camera, Projection, work};
 pub struct Tools {
     pub projected: Projected,
     pub candidates: Candidates,
-    pub shading: Shading,
     pub room: Room,
 }
 
@@ -31,8 +30,6 @@ pub enum Shows {
     Depth,
     /// Depth and contours.
     Contours,
-    /// Depth, parts and normals.
-    Channels,
 }
 
 /// The contribution of one mesh to a picture.
@@ -41,9 +38,6 @@ pub(super) struct Layer {
     pub area: Area,
     /// Depth in the area, row by row, infinite off the mesh.
     depth: Vec<f32>,
-    /// Nearness, parts (numbered as in the mesh) and normals in the area, if the picture
-    /// shows them.
-    pub channels: ChannelPixels,
     pub range: DepthRange,
     pub pieces: Vec<Piece>,
     /// Contains all pixels at which the pieces are tested.
@@ -57,7 +51,7 @@ impl Layer {
         &mut self,
         instance: &Instance,
         (camera, shows): (&Camera, Shows),
-        Tools { projected, candidates, shading, room }: &mut Tools,
+        Tools { projected, candidates, room }: &mut Tools,
         hidden: impl FnOnce(&DepthRange, &Area) -> bool,
     ) {
         let placement = Placement::new(camera, &instance.affine);
@@ -67,7 +61,6 @@ impl Layer {
         self.area = vertices.area(camera);
         self.pieces.clear();
         self.depth.clear();
-        self.channels.clear(camera, &Area::default());
         self.looks = Area::default();
         if vertices.outside(camera) {
             work::count(|work| work.outside += 1);
@@ -88,14 +81,7 @@ impl Layer {
         }
         self.looks = Area::looked_at(&self.pieces, camera);
         let (mesh, area) = (&instance.mesh, &self.area);
-        if shows == Shows::Channels {
-            self.channels.clear(camera, area);
-            let (drawn, scratch) = ((&**mesh, &placement, &vertices), (candidates, shading));
-            self.channels.draw(drawn, 0, camera, scratch, area);
-            self.depth.clone_from(&self.channels.nearness);
-        } else {
-            draw_mesh(mesh, &placement, camera, &vertices, candidates, area, &mut self.depth);
-        }
+        draw_mesh(mesh, &placement, camera, &vertices, candidates, area, &mut self.depth);
         to_depth(camera, &mut self.depth);
     }
 

@@ -10,48 +10,37 @@ pub struct Member<'a> {
     /// Its index among all meshes of the solid.
     pub index: usize,
     pub instance: &'a Instance,
-    /// The number of its first part among all parts of the solid.
-    pub first_part: u16,
 }
 
-/// The meshes of a list whose first mesh has the given index, and whose first part has the
-/// given number.
-fn listed(list: &[Instance], first: usize, part: u16) -> impl Iterator<Item = Member<'_>> {
-    (first..).zip(list).map(move |(index, instance)| Member {
-        index,
-        instance,
-        first_part: part.saturating_add(instance.first_part),
-    })
+/// The meshes of a list whose first mesh has the given index.
+fn listed(list: &[Instance], first: usize) -> impl Iterator<Item = Member<'_>> {
+    (first..).zip(list).map(|(index, instance)| Member { index, instance })
 }
 
 /// All meshes of a solid, in order.
 pub fn members(solid: &Solid) -> impl Iterator<Item = Member<'_>> {
-    let (mut first, mut part) = (0, 0u16);
-    solid.lists().flat_map(move |list| {
-        let members = listed(list, first, part);
-        (first, part) = (first + list.len(), part.saturating_add(list.part_count()));
-        members
-    })
+    solid
+        .lists()
+        .flat_map(|list| &**list)
+        .enumerate()
+        .map(|(index, instance)| Member { index, instance })
 }
 
-/// A mesh, its placement and its number.
+/// A mesh and its placement.
 struct Placed {
     /// A weak reference, so that the address is not reused while it is compared.
     mesh: Weak<Mesh>,
     affine: [u64; 12],
-    first_part: u16,
 }
 
 impl Placed {
-    fn new(Member { instance, first_part, .. }: &Member<'_>) -> Placed {
-        let affine = affine_bits(&instance.affine);
-        Placed { mesh: Arc::downgrade(&instance.mesh), affine, first_part: *first_part }
+    fn new(Member { instance, .. }: &Member<'_>) -> Placed {
+        Placed { mesh: Arc::downgrade(&instance.mesh), affine: affine_bits(&instance.affine) }
     }
 
-    fn is(&self, Member { instance, first_part, .. }: &Member<'_>) -> bool {
+    fn is(&self, Member { instance, .. }: &Member<'_>) -> bool {
         std::ptr::eq(self.mesh.as_ptr(), Arc::as_ptr(&instance.mesh))
             && self.affine == affine_bits(&instance.affine)
-            && self.first_part == *first_part
     }
 }
 
@@ -60,9 +49,6 @@ struct List {
     mark: MeshesMark,
     first: usize,
     count: usize,
-    /// The number of its first part, and the number of its parts.
-    first_part: u16,
-    parts: u16,
 }
 
 /// The meshes of a solid, in order. The members of a group are recognised by their list,
@@ -81,44 +67,39 @@ impl Meshes {
 
     /// The meshes of a solid that differ from these.
     pub fn changed<'a>(&self, solid: &'a Solid) -> Vec<Member<'a>> {
-        let (mut changed, mut first, mut part) = (Vec::new(), 0, 0u16);
+        let (mut changed, mut first) = (Vec::new(), 0);
         for (i, list) in solid.lists().enumerate() {
-            let is_it = |l: &&List| l.first == first && l.first_part == part && list.is(&l.mark);
-            let (count, parts) = match self.lists.get(i).filter(is_it) {
-                Some(known) => (known.count, known.parts),
+            let is_it = |l: &&List| l.first == first && list.is(&l.mark);
+            first += match self.lists.get(i).filter(is_it) {
+                Some(known) => known.count,
                 None => {
                     let differs = |member: &Member<'_>| {
                         !self.placed.get(member.index).is_some_and(|p| p.is(member))
                     };
-                    changed.extend(listed(list, first, part).filter(differs));
-                    (list.len(), list.part_count())
+                    changed.extend(listed(list, first).filter(differs));
+                    list.len()
                 }
             };
-            (first, part) = (first + count, part.saturating_add(parts));
         }
         changed
     }
 
     /// Records a solid whose differences are `changed`.
     pub fn set(&mut self, solid: &Solid, changed: &[Member<'_>]) {
-        let (mut first, mut first_part, mut lists) = (0, 0u16, 0);
+        let (mut first, mut lists) = (0, 0);
         for list in solid.lists() {
             let known = self.lists.get_mut(lists);
-            let is_it =
-                |l: &List| l.first == first && l.first_part == first_part && list.is(&l.mark);
-            let (count, parts) = match known {
-                Some(l) if is_it(l) => (l.count, l.parts),
+            first += match known {
+                Some(l) if l.first == first && list.is(&l.mark) => l.count,
                 known => {
-                    let (count, parts) = (list.len(), list.part_count());
-                    let new = List { mark: list.mark(), first, count, first_part, parts };
+                    let new = List { mark: list.mark(), first, count: list.len() };
                     match known {
                         Some(l) => *l = new,
                         None => self.lists.push(new),
                     }
-                    (count, parts)
+                    list.len()
                 }
             };
-            (first, first_part) = (first + count, first_part.saturating_add(parts));
             lists += 1;
         }
         self.lists.truncate(lists);

@@ -10,22 +10,20 @@
 //! Invariant: a picture depends on the solid and the camera alone, bit for bit: a canvas
 //! only saves work.
 
-mod channels;
 mod dynamic_mesh;
 mod layer;
 mod meshes;
 mod picture;
-mod static_channels;
 mod static_layer;
 
 use self::layer::{Shows, Tools, camera_bits};
 use self::picture::Picture;
-use super::{Camera, ContourChange, Contours, Frame, FrameChange};
+use super::{Camera, ContourChange, Contours};
 use crate::geom::Solid;
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
-/// The number of pictures that a canvas keeps: several cameras or sizes, with contours, with
-/// all channels, or with depth alone.
+/// The number of pictures that a canvas keeps: several cameras or sizes, with contours or with
+/// depth alone.
 const PICTURES: usize = 4;
 
 /// A shared canvas. Clones draw on the same one; a new canvas is empty.
@@ -68,28 +66,6 @@ impl Canvas {
     pub(super) fn depth(&self, solid: &Solid, camera: &Camera, contours: bool) -> Option<Vec<f32>> {
         let shows = if contours { Shows::Contours } else { Shows::Depth };
         self.shown(solid, (camera, shows), |picture| picture.depth().to_vec())
-    }
-
-    /// All channels of a solid; `None` if it is better drawn in full.
-    pub(super) fn frame(&self, solid: &Solid, camera: &Camera) -> Option<Frame> {
-        self.shown(solid, (camera, Shows::Channels), |picture| {
-            let (depth, channels) = (picture.depth().to_vec(), picture.channels());
-            let (part, normal) = (channels.part.clone(), channels.normal.clone());
-            Frame { width: camera.width, height: camera.height, depth, part, normal }
-        })
-    }
-
-    /// The change from the previous parts and normals; `None` if the solid is better drawn
-    /// in full.
-    pub(super) fn frame_change(&self, solid: &Solid, camera: &Camera) -> Option<FrameChange> {
-        self.with_picture((camera, Shows::Channels), |picture, tools| {
-            let ContourChange { from, to, .. } = picture.draw(solid, camera, tools)?;
-            let channels = picture.channels();
-            let at = || channels.changed.iter().map(|pixel| *pixel as usize);
-            let part = at().map(|at| channels.part[at]).collect();
-            let normal = at().map(|at| channels.normal[at]).collect();
-            Some(FrameChange { from, to, pixels: channels.changed.clone(), part, normal })
-        })
     }
 
     /// The change from the previous contours in this picture; `None` if the solid is

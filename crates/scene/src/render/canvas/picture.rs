@@ -4,7 +4,6 @@
 //! relies on the depth tests being monotone, in `f64` too: a piece hidden by another mesh
 //! or at a smaller depth range stays hidden with both.
 
-use super::channels::ShownChannels;
 use super::dynamic_mesh::DynamicMesh;
 use super::layer::{Layer, Shows, Tools};
 use super::meshes::{Member, Meshes, members};
@@ -39,7 +38,6 @@ pub(super) struct Picture {
     dynamic: Vec<DynamicMesh>,
     static_layer: Option<StaticLayer>,
     depth: Vec<f32>,
-    channels: ShownChannels,
     extent: f64,
     /// The number of drawings so far.
     clock: u64,
@@ -72,7 +70,6 @@ impl Picture {
             dynamic: Vec::new(),
             static_layer: None,
             depth: Vec::new(),
-            channels: ShownChannels::default(),
             extent: 0.0,
             clock: 0,
             swept: 0,
@@ -103,11 +100,6 @@ impl Picture {
     /// Depth, row by row.
     pub fn depth(&self) -> &[f32] {
         &self.depth
-    }
-
-    /// Parts and normals, and at which pixels they changed in the last drawing.
-    pub fn channels(&self) -> &ShownChannels {
-        &self.channels
     }
 
     /// Shows a solid and returns the change. `None` if the solid is better drawn in full:
@@ -156,7 +148,6 @@ impl Picture {
             return None;
         }
         self.shown.set(solid, &changed);
-        self.channels.changed.clear();
         let static_layer = self.static_layer.as_mut()?;
         self.areas.clear();
         if known {
@@ -261,9 +252,6 @@ impl Picture {
         let mut static_layer = StaticLayer::new(camera);
         let (whole, width) = (Area::whole(camera), camera.width as usize);
         let mut dynamic = self.dynamic.iter_mut().peekable();
-        if self.shows == Shows::Channels {
-            static_layer.channels.clear(camera);
-        }
         for member in members(solid) {
             if let Some(mesh) = dynamic.next_if(|m| m.index == member.index) {
                 mesh.move_to(&member, (camera, self.shows), tools, None);
@@ -272,9 +260,6 @@ impl Picture {
             let layer = &mut self.scratch;
             layer.draw(member.instance, (camera, self.shows), tools, |_, _| false);
             layer.show(&mut static_layer.depth, width, &whole);
-            if self.shows == Shows::Channels {
-                static_layer.channels.put(&member, layer, width);
-            }
             static_layer.range = static_layer.range.and(&layer.range);
             static_layer.pieces.extend(layer.pieces.iter().map(|piece| (*piece, member.index)));
             if static_layer.pieces.len() > MOST_PIECES {
@@ -287,7 +272,7 @@ impl Picture {
 
     /// Composes the whole picture and tests all pieces.
     fn begin(&mut self, camera: &Camera) -> Option<ContourChange> {
-        let Picture { static_layer, dynamic, depth, channels, extent, clock, .. } = self;
+        let Picture { static_layer, dynamic, depth, extent, .. } = self;
         let static_layer = static_layer.as_mut()?;
         work::count(|work| {
             work.partial += 1;
@@ -297,12 +282,6 @@ impl Picture {
         dynamic
             .iter()
             .for_each(|m| m.now.layer.show(depth, camera.width as usize, &Area::whole(camera)));
-        if self.shows == Shows::Channels {
-            channels.begin(camera);
-            let area = (camera, &Area::whole(camera));
-            channels.compose(area, &static_layer.channels, dynamic, *clock);
-            channels.changed.clear();
-        }
         let depths = Depths::new(depth, camera.width, camera.height, *extent)?;
         self.still = static_layer.test_all(&depths);
         dynamic.iter_mut().for_each(|mesh| mesh.look(&depths));
@@ -333,18 +312,7 @@ impl Picture {
         let clock = self.clock;
         let moved = |m: &DynamicMesh| m.moved == clock;
         let anything = !same_extent || self.dynamic.iter().any(moved);
-        let Picture {
-            static_layer,
-            dynamic,
-            depth,
-            channels,
-            extent,
-            rows,
-            pixels,
-            areas,
-            again,
-            ..
-        } = self;
+        let Picture { static_layer, dynamic, depth, extent, rows, pixels, areas, again, .. } = self;
         let (static_layer, width) = (static_layer.as_mut()?, camera.width as usize);
         Area::join(areas);
         work::count(|work| {
@@ -368,9 +336,6 @@ impl Picture {
                 there.copy_from_slice(static_layer);
             }
             vectorised(|| dynamic.iter().for_each(|m| m.now.layer.show(depth, width, area)));
-            if self.shows == Shows::Channels {
-                channels.compose((camera, area), &static_layer.channels, dynamic, clock);
-            }
             if !anything_still {
                 continue;
             }

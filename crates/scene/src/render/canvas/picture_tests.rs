@@ -30,56 +30,10 @@ struct Followed {
     picture: Picture,
     /// The same without contours, if that is compared, too.
     depth_alone: Option<Picture>,
-    /// The same with all channels, if that is compared, too.
-    channels: Option<FollowedChannels>,
     tools: Tools,
     at: Arc<()>,
     /// The current pieces of the stationary meshes as bits, in some order.
     pieces: Vec<[u32; 5]>,
-}
-
-/// A picture of all channels, and those that a follower of its changes has collected.
-struct FollowedChannels {
-    picture: Picture,
-    at: Arc<()>,
-    part: Vec<u16>,
-    normal: Vec<[u32; 3]>,
-    /// How often the change continued from the last one.
-    followed: usize,
-}
-
-impl FollowedChannels {
-    fn new(camera: &Camera) -> FollowedChannels {
-        let picture = Picture::new(camera_bits(camera), Shows::Channels);
-        let (part, normal) = (Vec::new(), Vec::new());
-        FollowedChannels { picture, at: Arc::default(), part, normal, followed: 0 }
-    }
-
-    /// Draws a solid, and compares the picture and its change with a full drawing. Returns
-    /// whether it was drawn incrementally.
-    fn check(&mut self, solid: &Solid, camera: &Camera, tools: &mut Tools) -> bool {
-        let Some(change) = self.picture.draw(solid, camera, tools) else { return false };
-        assert_eq!(change.count, 0);
-        let (wanted, got) = (Frame::render(solid, camera, Channels::All), self.picture.channels());
-        let normals = |list: &[[f32; 3]]| -> Vec<_> {
-            list.iter().map(|normal| normal.map(f32::to_bits)).collect()
-        };
-        let depths = |list: &[f32]| -> Vec<_> { list.iter().map(|d| d.to_bits()).collect() };
-        assert_eq!(depths(self.picture.depth()), depths(&wanted.depth));
-        if Arc::ptr_eq(&self.at, &change.from) {
-            for pixel in got.changed.iter().map(|pixel| *pixel as usize) {
-                self.part[pixel] = got.part[pixel];
-                self.normal[pixel] = got.normal[pixel].map(f32::to_bits);
-            }
-            self.followed += 1;
-        } else {
-            (self.part, self.normal) = (got.part.clone(), normals(&got.normal));
-        }
-        assert!(self.part == wanted.part && self.normal == normals(&wanted.normal));
-        assert!(got.part == wanted.part && normals(&got.normal) == self.normal);
-        self.at = change.to;
-        true
-    }
 }
 
 fn bits(c: &Contours) -> Vec<[u32; 5]> {
@@ -93,7 +47,6 @@ impl Followed {
         Followed {
             picture: Picture::new(camera_bits(camera), Shows::Contours),
             depth_alone: None,
-            channels: None,
             tools: Tools::default(),
             at: Arc::default(),
             pieces: Vec::new(),
@@ -113,9 +66,6 @@ impl Followed {
             assert!(change.is_none_or(|change| change.count == 0));
             &*alone
         });
-        if let Some(channels) = &mut self.channels {
-            assert_eq!(channels.check(solid, camera, tools), drawn.is_some());
-        }
         let Some(change) = drawn else { return [false; 2] };
         let (got, wanted) = (self.picture.contours(camera), Contours::of(solid, camera));
         assert_eq!(bits(&got), bits(&wanted));
@@ -152,7 +102,7 @@ impl Followed {
 #[test]
 fn pictures_give_what_is_drawn_at_once() {
     let mut random = Uniform(31);
-    let (mut drawn, mut followed, mut channels) = (0, 0, 0);
+    let (mut drawn, mut followed) = (0, 0);
     for round in 0..8 {
         let mut camera = Camera::default_for(60 + 7 * round, 96 - 5 * round);
         if round % 3 == 1 {
@@ -171,7 +121,6 @@ fn pictures_give_what_is_drawn_at_once() {
         let shapes: Vec<Solid> = (0..moving).map(|_| shape(&mut random)).collect();
         let mut followers = Followed::new(&camera);
         followers.depth_alone = Some(Picture::new(camera_bits(&camera), Shows::Depth));
-        followers.channels = Some(FollowedChannels::new(&camera));
         for step in 0..60 {
             let before = solids.clone();
             // Far, near, and out of the picture; now and then another mesh moves as well.
@@ -190,62 +139,8 @@ fn pictures_give_what_is_drawn_at_once() {
                 solids = before;
             }
         }
-        channels += followers.channels.map_or(0, |channels| channels.followed);
     }
-    assert!(drawn > 400 && followed > 250 && channels > 250, "{drawn} {followed} {channels}");
-}
-
-/// Meshes at the same place: the first one shows.
-#[test]
-fn of_equally_near_meshes_the_first_one_is_seen() {
-    let mut random = Uniform(34);
-    let camera = Camera::default_for(48, 40);
-    let mut followed = FollowedChannels::new(&camera);
-    let (ball, square) = (sphere(11, 7), cuboid(Vec3::splat(0.5)));
-    let place = |x: f64| Affine::new(DVec3::new(x, 0.1, 0.0), DVec3::splat(0.3), DVec3::ONE);
-    let mut solids: Vec<Solid> =
-        [0.0, 0.4, 0.0, 0.4, -0.3, 0.0, 0.4].map(|x| square.placed(place(x))).to_vec();
-    let (mut tools, mut drawn, mut parts) = (Tools::default(), 0, Vec::new());
-    for step in 0..60 {
-        let shape = if step % 4 == 0 { &ball } else { &square };
-        let at = (random.next() * 3.0) as usize * 2 + 1;
-        solids[at.min(6)] = shape.placed(place([0.0, 0.4, -0.3][step % 3]));
-        drawn += usize::from(followed.check(&Solid::group(&solids), &camera, &mut tools));
-        parts.extend_from_slice(&followed.part);
-    }
-    parts.sort_unstable();
-    parts.dedup();
-    assert!(drawn > 50 && followed.followed > 40 && parts.len() > 4, "{drawn} {parts:?}");
-}
-
-/// A mesh with more parts gives those after it other numbers, though they stay.
-#[test]
-fn parts_are_numbered_again_where_those_before_them_change() {
-    let mut random = Uniform(35);
-    let camera = Camera::default_for(48, 40);
-    let many = |count: u32| {
-        let mesh = sphere(11, 7).to_mesh().unwrap();
-        let faces = mesh.topology.triangles.clone();
-        let parts = (0..faces.len() as u32).map(|face| (face % count) as u16).collect();
-        Solid::new(Arc::new(Mesh::new(mesh.positions.to_vec(), faces.to_vec(), parts).unwrap()))
-    };
-    let (one, three) = (many(1), many(3));
-    let mut followed = FollowedChannels::new(&camera);
-    let still: Vec<Solid> =
-        (0..9).map(|_| three.placed(somewhere(&mut random, 1.2, 0.3))).collect();
-    let rest = Solid::group(&still);
-    let (mut tools, mut drawn, mut most) = (Tools::default(), 0, 0);
-    for step in 0..60 {
-        let first = [&one, &three][step / 2 % 2].placed(somewhere(&mut random, 0.8, 0.3));
-        let solid = match step % 3 {
-            0 => Solid::group(&[first, rest.clone()]),
-            1 => Solid::group(&[&[first][..], &still].concat()),
-            _ => Solid::group(&[&still[..4], &[first], &still[4..]].concat()),
-        };
-        drawn += usize::from(followed.check(&solid, &camera, &mut tools));
-        most = most.max(followed.part.iter().filter(|p| **p != u16::MAX).max().map_or(0, |p| *p));
-    }
-    assert!(drawn > 20 && most > 26, "{drawn} {most}");
+    assert!(drawn > 400 && followed > 250, "{drawn} {followed}");
 }
 
 #[test]
@@ -333,7 +228,6 @@ fn odd_placements_are_as_drawn_at_once() {
     let fixed: Vec<Solid> =
         (0..6).map(|_| shape(&mut random).placed(somewhere(&mut random, 1.0, 0.4))).collect();
     let mut followed = Followed::new(&camera);
-    followed.channels = Some(FollowedChannels::new(&camera));
     let odd = [
         (DVec3::new(f64::NAN, 0.0, 0.0), 1.0),
         (DVec3::new(0.0, f64::INFINITY, 0.0), 1.0),
@@ -432,7 +326,6 @@ fn meshes_that_move_by_turns_are_as_drawn_at_once() {
             camera.eye.z = 0.4;
         }
         let mut followed = Followed::new(&camera);
-        followed.channels = Some(FollowedChannels::new(&camera));
         let mut meshes: Vec<_> = (0..2 + round).map(|_| part(&mut random)).collect();
         let mut by = Affine::IDENTITY;
         for step in 0..50 {

@@ -1,7 +1,6 @@
-//! The stationary meshes of a scene: their depth, parts and normals, and their pieces of
-//! contour by the pixels at which they are tested.
+//! The stationary meshes of a scene: their depth, and their pieces of contour by the
+//! pixels at which they are tested.
 
-use super::static_channels::StaticChannels;
 use crate::render::Camera;
 use crate::render::lines::visibility::{DepthTest, Depths, Piece};
 use crate::render::pixels::area::Area;
@@ -21,8 +20,6 @@ const SHOWN: u8 = 0b100;
 #[derive(Default)]
 pub struct StaticLayer {
     pub depth: Vec<f32>,
-    /// Parts and normals, if the picture shows them.
-    pub channels: StaticChannels,
     pub range: DepthRange,
     /// All pieces, with the index of their mesh.
     pub pieces: Vec<(Piece, usize)>,

@@ -15,7 +15,6 @@ use crate::render::simd::vectorised;
 use crate::render::{Camera, work};
 use glam::{DVec3, Vec3};
 use std::cell::RefCell;
-use std::sync::Arc;
 
 /// Which channels to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,23 +38,6 @@ pub struct Frame {
     pub part: Vec<u16>,
     /// Unit normal in the camera's frame (x right, y up, z towards the camera), on the
     /// visible side of the surface; zero off the object. Empty when only depth was drawn.
-    pub normal: Vec<[f32; 3]>,
-}
-
-/// A change from one frame to another, at the pixels whose part or normal differs. A frame is
-/// identified by the address of its `Arc`.
-#[derive(Debug)]
-pub struct FrameChange {
-    /// Identifies the frame before. If it is unknown, a new identity that nobody holds, and
-    /// no pixels are listed.
-    pub from: Arc<()>,
-    /// Identifies the frame now.
-    pub to: Arc<()>,
-    /// The pixels, numbered row by row, each once.
-    pub pixels: Vec<u32>,
-    /// Their parts now, as in [`Frame`].
-    pub part: Vec<u16>,
-    /// Their normals now.
     pub normal: Vec<[f32; 3]>,
 }
 

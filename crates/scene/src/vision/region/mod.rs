@@ -24,7 +24,6 @@ use self::counts::DirichletMultinomial;
 use super::elements::{ComparatorError, check, check_size};
 use super::pictures::photo::Photo;
 use pcadlang_numerics::rng::Stream;
-use std::sync::Arc;
 
 /// Options of [`Region`].
 #[derive(Debug, Clone, PartialEq)]
@@ -88,21 +87,6 @@ impl RegionOptions {
     fn by_tile(&self) -> f64 {
         if self.tiles == 0 { 0.0 } else { self.tile_power }
     }
-}
-
-/// A change from one picture's groups and normals to another's.
-#[derive(Debug, Clone, Copy)]
-pub struct GroupChange<'a> {
-    /// Identifies the picture before; if it is unknown, an identity that nobody holds.
-    pub from: &'a Arc<()>,
-    /// Identifies the picture now.
-    pub to: &'a Arc<()>,
-    /// The pixels that changed, numbered row by row.
-    pub pixels: &'a [u32],
-    /// Their groups.
-    pub groups: &'a [u8],
-    /// Their normals.
-    pub normals: &'a [[f32; 3]],
 }
 
 /// A photograph's colours, prepared for scoring many silhouettes.
@@ -217,29 +201,6 @@ impl Region {
         tally: &mut Tally,
     ) -> f64 {
         tally.follow(self, groups);
-        self.score(tally, |_| shading::log_ratio(groups, normals, &self.brightness))
-    }
-
-    /// [`Region::log_likelihood`] of the picture after a change, bit for bit. If the tally
-    /// holds the picture before, only the change is counted; otherwise `whole` is called with
-    /// a function that takes the groups and normals of the whole picture.
-    pub fn log_likelihood_following(
-        &self,
-        change: &GroupChange<'_>,
-        whole: impl FnOnce(&mut dyn FnMut(&[u8], &[[f32; 3]])),
-        tally: &mut Tally,
-    ) -> f64 {
-        if !tally.follow_change(self, change) {
-            whole(&mut |groups, normals| {
-                tally.follow(self, groups);
-                tally.follow_from(self, normals, change.to);
-            });
-        }
-        self.score(tally, |tally| tally.shading(self))
-    }
-
-    /// The score of the groups counted, given a function for the shading term.
-    fn score(&self, tally: &mut Tally, shading: impl FnOnce(&mut Tally) -> f64) -> f64 {
         if tally.is_empty() {
             return 0.0;
         }
@@ -252,7 +213,7 @@ impl Region {
             sum += self.options.power * tally.whole(self);
         }
         if self.options.shading > 0.0 {
-            sum += self.options.shading * shading(tally);
+            sum += self.options.shading * shading::log_ratio(groups, normals, &self.brightness);
         }
         sum
     }

@@ -133,67 +133,6 @@ fn products(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32]) -> Products
     sums
 }
 
-/// The sums of a picture, kept while some of its pixels change.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Kept {
-    normals: Vec<[f32; 3]>,
-    /// By run, and by group of runs.
-    runs: Vec<Products>,
-    sums: Vec<Products>,
-    /// Runs with pixels that have changed since.
-    changed: Vec<bool>,
-}
-
-impl Kept {
-    /// Starts with a picture of `pixels` pixels; normals missing at the end are not finite.
-    pub fn begin(&mut self, normals: &[[f32; 3]], pixels: usize) {
-        self.normals.clear();
-        self.normals.extend_from_slice(&normals[..normals.len().min(pixels)]);
-        self.normals.resize(pixels, [f32::NAN; 3]);
-        let runs = pixels.div_ceil(RUN);
-        self.runs.clear();
-        self.runs.resize(runs, NONE);
-        self.sums.clear();
-        self.sums.resize(runs.div_ceil(RUNS), NONE);
-        self.changed.clear();
-        self.changed.resize(runs, true);
-    }
-
-    /// A pixel has another normal, or another group.
-    pub fn change(&mut self, pixel: usize, normal: [f32; 3]) {
-        if let (Some(own), Some(changed)) =
-            (self.normals.get_mut(pixel), self.changed.get_mut(pixel / RUN))
-        {
-            (*own, *changed) = (normal, true);
-        }
-    }
-
-    /// As [`log_ratio`], bit for bit.
-    pub fn log_ratio(&mut self, groups: &[u8], brightness: &[f32]) -> f64 {
-        let Kept { normals, runs, sums, changed } = self;
-        let pixels = groups.chunks(RUN).zip(normals.chunks(RUN)).zip(brightness.chunks(RUN));
-        let mut pixels =
-            pixels.map(|((groups, normals), brightness)| (groups, normals, brightness));
-        let of_runs = runs.chunks_mut(RUNS).zip(changed.chunks_mut(RUNS));
-        for ((runs, changed), sum) in of_runs.zip(sums.iter_mut()) {
-            let again = changed.contains(&true);
-            for (run, changed) in runs.iter_mut().zip(changed) {
-                let Some((groups, normals, brightness)) = pixels.next() else { break };
-                if std::mem::take(changed) {
-                    *run = if any(groups) { products(groups, normals, brightness) } else { NONE };
-                }
-            }
-            if again {
-                *sum = NONE;
-                runs.iter().for_each(|run| add(sum, run));
-            }
-        }
-        let mut all = NONE;
-        sums.iter().for_each(|sum| add(&mut all, sum));
-        from_products(&all)
-    }
-}
-
 /// Computes the log ratio from sums of products of (1, terms, brightness), of which those
 /// on and above the diagonal are used. The constant has a flat prior, so it takes one
 /// degree of freedom.

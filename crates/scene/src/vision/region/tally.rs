@@ -3,9 +3,7 @@
 //! Invariant: scores are those of counting the picture anew, bit for bit: counts are whole
 //! numbers, and each tile's score is computed from its counts alone.
 
-use super::shading::Kept;
-use super::{GroupChange, Region};
-use std::sync::Arc;
+use super::Region;
 
 /// Number of pixels that are compared at a time.
 const SOME: usize = 64;
@@ -14,10 +12,6 @@ const SOME: usize = 64;
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     groups: Vec<u8>,
-    /// Identifies the picture, if it is known.
-    of: Option<Arc<()>>,
-    /// The sums of the shading term, if it is scored and the picture is known.
-    shading: Kept,
     /// Number of pixels whose group is not 0.
     inside: usize,
     /// Number of pixels of each cell, group after group, starting with group 1.
@@ -38,47 +32,8 @@ impl Tally {
         self.inside == 0
     }
 
-    /// The log ratio of the shading term, after [`Tally::follow_change`].
-    pub(super) fn shading(&mut self, region: &Region) -> f64 {
-        self.shading.log_ratio(&self.groups, &region.brightness)
-    }
-
-    /// Follows a change of the picture; `false` if the picture before it is not this one.
-    pub(super) fn follow_change(&mut self, region: &Region, change: &GroupChange<'_>) -> bool {
-        let is = |known: &Arc<()>| self.of.as_ref().is_some_and(|of| Arc::ptr_eq(of, known));
-        if is(change.to) {
-            return true;
-        }
-        if !is(change.from) {
-            return false;
-        }
-        let mut here = std::mem::take(&mut self.groups);
-        for (pixel, group) in change.pixels.iter().map(|p| *p as usize).zip(change.groups) {
-            if let Some(known) = here.get_mut(pixel) {
-                self.move_pixel(region, pixel, known, *group);
-            }
-        }
-        self.groups = here;
-        if region.options.shading > 0.0 {
-            for (pixel, normal) in change.pixels.iter().zip(change.normals) {
-                self.shading.change(*pixel as usize, *normal);
-            }
-        }
-        self.of = Some(Arc::clone(change.to));
-        true
-    }
-
-    /// Starts following a picture, which has just been counted.
-    pub(super) fn follow_from(&mut self, region: &Region, normals: &[[f32; 3]], of: &Arc<()>) {
-        if region.options.shading > 0.0 {
-            self.shading.begin(normals, self.groups.len());
-        }
-        self.of = Some(Arc::clone(of));
-    }
-
     /// Counts the pixels whose group differs; missing ones are background.
     pub(super) fn follow(&mut self, region: &Region, groups: &[u8]) {
-        self.of = None;
         let pixels = region.cells.len();
         if self.groups.len() != pixels {
             let tiles = region.empty_tiles.len();

@@ -5,7 +5,6 @@ use super::*;
 use pcadlang_numerics::rng::{Purpose, StreamKey};
 
 /// What counts a picture's groups and normals.
-type Count<'a> = &'a mut dyn FnMut(&[u8], &[[f32; 3]]);
 
 const GLOBAL: RegionOptions =
     RegionOptions { power: 1.0, tiles: 0, tile_power: 0.0, colours: 4, prior: 0.5, shading: 0.0 };
@@ -257,77 +256,6 @@ fn options_are_checked_and_uniform_pictures_say_nothing() {
             && GLOBAL.is_proper()
             && !RegionOptions { shading: 0.1, ..GLOBAL }.is_proper()
     );
-}
-
-#[test]
-fn a_tally_follows_changes_bit_for_bit() {
-    let (w, h, n) = (37u32, 29u32, 37 * 29);
-    let mut rng = stream(41);
-    let noise = |rng: &mut Stream| [(); 3].map(|()| rng.index(256) as u8);
-    let rgb = image::RgbImage::from_fn(w, h, |_, _| image::Rgb(noise(&mut rng)));
-    let photo = Photo::from_rgb(rgb).unwrap();
-    for o in [
-        RegionOptions { shading: 0.4, ..RegionOptions::default() },
-        RegionOptions { power: 0.0, tiles: 0, shading: 1.0, ..RegionOptions::default() },
-        RegionOptions { power: 0.3, tiles: 6, tile_power: 0.7, ..GLOBAL },
-    ] {
-        let region = Region::prepare(&photo, w, h, &o).unwrap();
-        let normal = |rng: &mut Stream| {
-            // Now and then one that does not count.
-            let z = if rng.index(40) == 0 { f32::NAN } else { rng.uniform() as f32 };
-            [rng.uniform() as f32 - 0.5, rng.uniform() as f32 - 0.5, z]
-        };
-        let mut groups = vec![0; n];
-        let mut normals: Vec<_> = (0..n).map(|_| normal(&mut rng)).collect();
-        let (mut tally, mut at, mut asked) = (Tally::default(), Arc::new(()), 0);
-        for step in 0..80 {
-            // A few pixels, a block of them, all of them gone, or none; now and then the change
-            // starts from an unknown picture, or another one is scored in between.
-            let pixels: Vec<u32> = match step % 5 {
-                0 | 1 => (0..rng.index(60)).map(|_| rng.index(n) as u32).collect(),
-                2 => (0..300).map(|i| (rng.index(n / 2) + i) as u32).collect(),
-                3 if step % 2 == 0 => (0..n as u32).collect(),
-                _ => Vec::new(),
-            };
-            let mut pixels = pixels;
-            pixels.sort_unstable();
-            pixels.dedup();
-            for pixel in pixels.iter().map(|p| *p as usize) {
-                groups[pixel] = if step % 5 == 3 { 0 } else { rng.index(4) as u8 };
-                normals[pixel] = normal(&mut rng);
-            }
-            let lost = step % 11 == 7;
-            let (from, to) = (if lost { Arc::default() } else { at }, Arc::new(()));
-            let (listed, there) = if lost {
-                (&[][..], Vec::new())
-            } else {
-                (&pixels[..], pixels.iter().map(|p| *p as usize).collect::<Vec<_>>())
-            };
-            let change = GroupChange {
-                from: &from,
-                to: &to,
-                pixels: listed,
-                groups: &there.iter().map(|p| groups[*p]).collect::<Vec<_>>(),
-                normals: &there.iter().map(|p| normals[*p]).collect::<Vec<_>>(),
-            };
-            let plain = region.log_likelihood(&groups, &normals);
-            for _ in 0..2 {
-                let whole = |count: Count| {
-                    asked += 1;
-                    count(&groups, &normals);
-                };
-                let got = region.log_likelihood_following(&change, whole, &mut tally);
-                assert_eq!(got.to_bits(), plain.to_bits(), "step {step}");
-            }
-            if step % 17 == 9 {
-                let other = region.log_likelihood_after(&groups[..n / 2], &normals, &mut tally);
-                let plain = region.log_likelihood(&groups[..n / 2], &normals);
-                assert_eq!(other.to_bits(), plain.to_bits(), "step {step}");
-            }
-            at = to;
-        }
-        assert!((8..16).contains(&asked), "{asked}");
-    }
 }
 
 #[test]

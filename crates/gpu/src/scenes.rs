@@ -1,15 +1,8 @@
-//! Drawing many scenes at once, for banks of proposals and populations, whose members do
-//! not wait for one another.
-//!
-//! [`BatchRenderer`] is the interface for other devices: its input is shared meshes with
-//! flat lists of vertices, its output is one set of flat lists for all scenes. Invariant:
-//! a scene's contours do not depend on the other scenes, on their order, or on the number
-//! of threads: they are those of [`Contours::of`].
+//! Many scenes and their contours, as flat lists, and the CPU's cores that draw the same.
 
-use super::{Camera, Contours};
-use crate::contours::ContourSlice;
-use crate::geom::Solid;
 use pcadlang_numerics::platform::threads::Pool;
+use pcadlang_scene::geom::Solid;
+use pcadlang_scene::render::{Camera, ContourSlice, Contours};
 
 /// A scene to be drawn.
 ///
@@ -90,14 +83,6 @@ impl ContourBatch {
     }
 }
 
-/// Draws the contours of many scenes.
-pub trait BatchRenderer: Sync {
-    /// The contours of each scene, in the order given: on the CPU, those of
-    /// [`Contours::of`] bit for bit; another device may differ by rounding, and must
-    /// document by how much.
-    fn contours(&self, scenes: &[Scene]) -> ContourBatch;
-}
-
 /// Draws on several cores of the CPU.
 pub struct Cores {
     pool: Pool,
@@ -109,53 +94,13 @@ impl Cores {
     pub fn new(threads: usize) -> Cores {
         Cores { pool: Pool::new(threads) }
     }
-}
 
-impl BatchRenderer for Cores {
-    fn contours(&self, scenes: &[Scene]) -> ContourBatch {
+    /// The contours of each scene, in the order given: those of [`Contours::of`].
+    pub fn contours(&self, scenes: &[Scene]) -> ContourBatch {
         let draw = |scene: &Scene| Contours::of(&scene.solid, &scene.camera);
         let drawn = self.pool.map(scenes.iter().collect(), draw);
         let mut batch = ContourBatch::default();
         drawn.iter().for_each(|contours| batch.push(contours));
         batch
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geom::Affine;
-    use crate::render::testing::{Uniform, lathe, sphere};
-    use glam::DVec3;
-
-    #[test]
-    fn scenes_are_drawn_as_one_by_one_on_any_number_of_threads() {
-        let mut random = Uniform(41);
-        let shapes = [sphere(24, 16), lathe(&[(0.3, -0.8), (0.7, -0.2), (0.4, 0.5)], 24, true)];
-        let mut one = |i: usize| {
-            let turn = DVec3::from_array([(); 3].map(|()| random.between(-1.0, 1.0)));
-            // Some are out of view.
-            let at = DVec3::new(
-                if i.is_multiple_of(7) { 50.0 } else { random.between(-0.5, 0.5) },
-                0.0,
-                0.0,
-            );
-            let solid = shapes[i % 2].placed(Affine::new(at, turn, DVec3::ONE));
-            Scene { solid, camera: Camera::default_for(40 + (i as u32 % 3) * 20, 50) }
-        };
-        let scenes: Vec<Scene> = (0..40).map(&mut one).collect();
-        let batch = Cores::new(1).contours(&scenes);
-        for threads in [0, 2, 5] {
-            assert_eq!(Cores::new(threads).contours(&scenes), batch);
-        }
-        assert_eq!((batch.len(), batch.is_empty()), (40, false));
-        for (i, scene) in scenes.iter().enumerate() {
-            let (own, wanted) = (batch.scene(i), Contours::of(&scene.solid, &scene.camera));
-            assert_eq!((own.x, own.y, own.tx), (&wanted.x[..], &wanted.y[..], &wanted.tx[..]));
-            assert_eq!((own.ty, own.length), (&wanted.ty[..], &wanted.length[..]));
-            assert_eq!((own.width, own.height), (scene.camera.width, scene.camera.height));
-            assert_eq!(own.x.is_empty(), i % 7 == 0);
-        }
-        assert!(batch.scene(40).x.is_empty() && Cores::new(2).contours(&[]).is_empty());
     }
 }
