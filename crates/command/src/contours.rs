@@ -9,7 +9,7 @@ use pcadlang_scene::vision::{FileDetector, GradientDetector};
 
 /// Detects the contours of a photograph and writes them as a map.
 pub fn contours(a: &Contours) -> Result<(), Failure> {
-    let photo = files::photo(&a.image)?;
+    let photo = inputs::photo(&a.image)?;
     let map = match &a.edges {
         None => {
             let by = GradientDetector::default();

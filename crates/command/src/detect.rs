@@ -82,7 +82,7 @@ const BONES: [(&[Bone], [f32; 3]); 3] = [
 
 /// Detects the people in a photograph and writes their positions.
 pub fn detect(a: &Detect) -> Result<(), Failure> {
-    let photo = files::photo(&a.image)?;
+    let photo = inputs::photo(&a.image)?;
     let options = FindOptions { views: a.views, most: a.people as usize, ..FindOptions::default() };
     let people = inputs::finder(a.models.as_deref())?
         .find(&photo, &options, a.threads)

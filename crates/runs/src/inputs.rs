@@ -11,7 +11,7 @@ use pcadlang_engine::trace::Limits as Bounds;
 use pcadlang_library::scene::{self, DetectorValue, ImageValue};
 use pcadlang_library::{Model, Program, standard};
 use pcadlang_scene::render::Camera;
-use pcadlang_scene::vision::{ContourMap, Photo};
+use pcadlang_scene::vision::{self, ContourMap, Photo};
 use pcadlang_syntax::ast::{ExprKind, ItemKind};
 use pcadlang_syntax::parse;
 use pcadlang_syntax::span::FileId;
@@ -27,7 +27,7 @@ pub struct Ready {
     pub model: Model,
     /// The name and value of the photograph.
     pub named_image: Option<(String, Value)>,
-    /// Whether the program has a param `person`, which selects a person in the
+    /// The program has a param `person`, which selects a person in the
     /// photograph.
     pub chooses: bool,
     /// When the run's time began.
@@ -115,6 +115,13 @@ pub fn program(inputs: &Inputs, quiet: bool) -> Result<Program, Failure> {
     Ok(program)
 }
 
+/// Reads a photograph.
+pub fn photo(path: &Path) -> Result<Photo, Failure> {
+    let bytes = files::read(path)?;
+    vision::photo::decode(&bytes, &vision::Limits::default())
+        .map_err(|e| plain(format!("{}: {e}", path.display())))
+}
+
 /// Binds the files of `--observe`, `--keypoints` and `--observe-contours`. Returns the
 /// name and the value of the photograph, if one is among them.
 pub fn observe(
@@ -130,7 +137,7 @@ pub fn observe(
             program.interface().data.iter().find(|d| d.name == name).and_then(|d| d.ty.clone());
         match kind.as_deref() {
             Some("image") => {
-                let photo = Value::object(ImageValue::photo(files::photo(Path::new(&path))?));
+                let photo = Value::object(ImageValue::photo(photo(Path::new(&path))?));
                 program = program.observe(&name, photo.clone());
                 stem = Path::new(&path).file_stem().and_then(|s| s.to_str()).map(str::to_owned);
                 image = Some((name, photo));
@@ -157,7 +164,7 @@ pub fn observe(
         program = program.observe(&name, found.map_err(|f| Failure::Plain(f.message, f.hint))?);
     }
     if let Some(path) = &job.observe_contours {
-        let map = ContourMap::from_photo(&files::photo(path)?);
+        let map = ContourMap::from_photo(&photo(path)?);
         let name = match &image {
             Some((name, _)) => name.clone(),
             None => only(&program, "image", "--observe")?,

@@ -145,7 +145,7 @@ impl<C, T> fmt::Debug for SharedTally<C, T> {
 }
 
 impl<C: Send + Sync + 'static, T: Default + Send + 'static> SharedTally<C, T> {
-    /// What the previous evaluation kept. While another thread counts, nothing: forks that
+    /// The sums of the previous evaluation; new ones while another thread counts: forks that
     /// run side by side would disturb each other.
     pub fn after(previous: Option<&PreviousEvaluation>) -> Arc<SharedTally<C, T>> {
         let kept = previous.and_then(|p| Arc::clone(&p.state).downcast::<SharedTally<C, T>>().ok());
@@ -387,7 +387,7 @@ struct MaskOf {
     view: Arc<View>,
     size: u32,
     eps: [f64; 2],
-    /// Whether pixels are covered in part.
+    /// Pixels may be covered in part.
     partial: bool,
 }
 

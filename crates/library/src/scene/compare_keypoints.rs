@@ -114,11 +114,11 @@ struct KeypointsOf {
 struct Model {
     options: KeypointOptions,
     by_joint: ByJoint,
-    /// Whether the confidence of detections is used.
+    /// The confidence of detections is used.
     confident: bool,
 }
 
-/// What the likelihoods of one node of a trace share: the detections with their landmarks
+/// Shared by the likelihoods of one node of a trace: the detections with their landmarks
 /// and models, which stay the same while the scene moves.
 type Kept = Mutex<Option<Arc<Matched>>>;
 

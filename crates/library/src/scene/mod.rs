@@ -24,7 +24,6 @@ mod scene_view;
 mod seeing;
 mod shapes;
 
-pub use inputs::{CAMERAS, DETECTOR_DEFAULT};
 pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};
 pub use observed::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue};
 pub use scene_view::SceneView;

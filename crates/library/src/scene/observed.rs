@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 /// such as the `sigma` of a chamfer distance.
 const MOST: usize = 32;
 
-/// What comparators prepared from one observation, each by its type and options.
+/// Data prepared from one observation, each item by its type and options.
 #[derive(Debug, Default)]
 pub(super) struct Prepared(Mutex<Vec<Box<dyn Any + Send + Sync>>>);
 
@@ -71,12 +71,12 @@ pub struct ImageValue {
     photo: Option<Photo>,
     /// Its contours, given or detected on first use.
     map: OnceLock<Result<ContourMap, Fault>>,
-    /// Whether the contours were given.
+    /// The contours were given.
     ready: bool,
     /// The detector to use where the program does not choose one.
     by: OnceLock<DetectorValue>,
-    /// What depends on the photograph and options: contours by other detectors, candidate
-    /// objects, people, and what comparators measure against.
+    /// Contours by other detectors, candidate objects, people, and the reference data of
+    /// comparators.
     pub(super) prepared: Prepared,
 }
 
@@ -197,7 +197,7 @@ impl ImageValue {
 pub struct DetectorValue(pub Option<Arc<FileDetector>>);
 
 impl PartialEq for DetectorValue {
-    /// Whether both come from the same reading of a file, which may have changed in
+    /// Equal if both come from the same reading of a file, which may have changed in
     /// between.
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {

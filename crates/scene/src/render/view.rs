@@ -39,12 +39,12 @@ struct Pictures {
 pub struct View {
     solid: Solid,
     camera: Camera,
-    /// What it shares with the views before and after it.
+    /// Shared with the views before and after it.
     canvas: Canvas,
     /// The pictures by size; few sizes are ever requested, so a list is enough.
     pictures: Mutex<Vec<(u32, Arc<Pictures>)>>,
-    /// What comparators declared that they read, of this view and of the one before it: where
-    /// one reads contours and another depth, contours are read from the depth.
+    /// The channels that comparators declared, of this view and of the one before it: where one
+    /// reads contours and another depth, contours are read from the depth.
     read: Mutex<Vec<(Channel, u32)>>,
     read_before: Vec<(Channel, u32)>,
 }
@@ -81,7 +81,7 @@ impl View {
         }
     }
 
-    /// Whether a comparator reads a channel, of this view or of the one before it.
+    /// Returns whether a comparator reads a channel, of this view or of the one before it.
     fn is_read(&self, channel: Channel, size: u32) -> bool {
         let read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
         read.contains(&(channel, size)) || self.read_before.contains(&(channel, size))

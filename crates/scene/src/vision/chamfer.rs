@@ -12,8 +12,8 @@ mod stationary;
 
 use self::reverse::Reverse;
 use self::stationary::Stationary;
+use super::elements::{CHANNELS, Edges, PER_RADIAN, channels_of, turn_between};
 use super::elements::{ComparatorError, Element, check};
-use super::field::{CHANNELS, Edges, PER_RADIAN, channels_of, turn_between};
 use super::pictures::contour_map::ContourMap;
 use crate::contours::{ContourChange, ContourSlice};
 use pcadlang_numerics::num::LN_SQRT_2PI;

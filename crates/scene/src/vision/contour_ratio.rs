@@ -13,21 +13,95 @@
 //! about 0.
 
 mod background;
-mod gradient;
 mod match_capacity;
-mod options;
 mod ratio;
 
 use self::background::scores;
 use self::match_capacity::{MatchCapacity, NO_GROUP};
-use super::elements::ComparatorError;
-use super::field::{CHANNELS, Edge, Edges, channels_of, turn_between};
+use super::elements::{CHANNELS, Edge, Edges, channels_of, turn_between};
+use super::elements::{ComparatorError, PER_RADIAN, check};
 use super::pictures::contour_map::ContourMap;
 use crate::contours::{ContourChange, ContourSlice};
 use pcadlang_numerics::platform::threads::side_by_side;
 
 pub use self::match_capacity::Scratch;
-pub use self::options::ContourRatioOptions;
+
+/// Options of [`ContourRatio`]. Lengths are percent of the image
+/// diagonal. The defaults were chosen on ten pictures of 256 x 256 pixels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContourRatioOptions {
+    /// Fraction of pieces that have a matching observed edge, above 0 and below 1.
+    /// Default 0.75.
+    pub foreground: f64,
+    /// Standard deviation of the half-normal distance of those pieces, above 0. Default
+    /// 0.4.
+    pub sd: f64,
+    /// Distances from this value on count as "no edge nearby", above 0. Default 3.3.
+    pub truncate: f64,
+    /// Side of the window around a piece from which the background density is estimated,
+    /// as a fraction of the picture's sides, above 0 and at most 2. Default 0.25.
+    pub window: f64,
+    /// Length of rendered contour that observed edges match at full score, as a multiple
+    /// of their own length, above 0. Default 2.
+    pub credit: f64,
+    /// Power to which the likelihood ratio of a `unit` of contour is raised, at least 0.
+    /// Default 0.5.
+    pub weight: f64,
+    /// Length of contour that counts as one observation, above 0. Default 0.5524: two
+    /// pixels of a 256 x 256 picture.
+    pub unit: f64,
+    /// Length of contour in view (percent of the diagonal, above 0) below which a penalty
+    /// applies, linear in the missing length. Default 10.
+    pub least: f64,
+    /// The penalty with nothing in view, as the length of contour far from every edge
+    /// that has the same score; at least 0. Default 1000: ten diagonals.
+    pub nothing: f64,
+}
+
+impl ContourRatioOptions {
+    /// The defaults.
+    pub const USUAL: ContourRatioOptions = ContourRatioOptions {
+        foreground: 0.75,
+        sd: 0.4,
+        truncate: 3.3,
+        window: 0.25,
+        credit: 2.0,
+        weight: 0.5,
+        unit: 200.0 / (256.0 * std::f64::consts::SQRT_2),
+        least: 10.0,
+        nothing: 1000.0,
+    };
+}
+
+impl Default for ContourRatioOptions {
+    fn default() -> Self {
+        ContourRatioOptions::USUAL
+    }
+}
+
+impl ContourRatioOptions {
+    pub(super) fn check(&self) -> Result<(), ComparatorError> {
+        check(
+            "foreground",
+            "above 0 and below 1",
+            self.foreground,
+            self.foreground > 0.0 && self.foreground < 1.0,
+        )?;
+        check("sd", "above 0", self.sd, self.sd > 0.0)?;
+        check("truncate", "above 0", self.truncate, self.truncate > 0.0)?;
+        check(
+            "window",
+            "above 0 and at most 2",
+            self.window,
+            self.window > 0.0 && self.window <= 2.0,
+        )?;
+        check("credit", "above 0", self.credit, self.credit > 0.0)?;
+        check("weight", "at least 0", self.weight, self.weight >= 0.0)?;
+        check("unit", "above 0", self.unit, self.unit > 0.0)?;
+        check("least", "above 0", self.least, self.least > 0.0)?;
+        check("nothing", "at least 0", self.nothing, self.nothing >= 0.0)
+    }
+}
 
 /// A sample of the grid, for one orientation channel.
 #[derive(Debug, Clone, Copy)]
@@ -179,6 +253,65 @@ impl ContourRatio {
         let penalty = missing * self.options.nothing * libm::log(1.0 - self.options.foreground);
         let score = (evidence + penalty) * self.options.weight / self.options.unit;
         score.clamp(f64::MIN, f64::MAX)
+    }
+}
+
+impl ContourRatio {
+    /// Computes the derivatives of [`ContourRatio::log_likelihood`] with respect to each
+    /// element's x, y, length (pixels) and angle (radians, from right to down) into
+    /// `out`.
+    pub fn gradient(
+        &self,
+        elements: &ContourSlice<'_>,
+        scratch: &mut Scratch,
+        out: &mut Vec<[f64; 4]>,
+    ) {
+        out.clear();
+        out.resize(elements.len(), [0.0; 4]);
+        // Fills in every group's assignments.
+        self.log_likelihood_with(elements, scratch);
+        let samples = self.grid.width as usize * self.grid.height as usize;
+        let factor = self.options.weight / self.options.unit;
+        let length: f64 = elements
+            .in_view()
+            .map(|e| (f64::from(e.length * e.weight) * self.percent).min(1e4))
+            .sum();
+        // With too little contour in view, each unit of length reduces the penalty.
+        let missing = if length < self.options.least {
+            -self.options.nothing * libm::log(1.0 - self.options.foreground) / self.options.least
+        } else {
+            0.0
+        };
+        for e in elements.in_view() {
+            let Some(place) = out.get_mut(e.index) else { continue };
+            let (low, high, f) = channels_of(e.tx, e.ty);
+            let corners = self.grid.corners(e.x, e.y);
+            // The score per unit length in each channel, and its derivatives over the
+            // grid.
+            let read = |k: usize| {
+                let [a, b, c, d] = corners.at.map(|at| match self.cells.get(k * samples + at) {
+                    Some(cell) if cell.group == NO_GROUP => f64::from(cell.score),
+                    Some(cell) => scratch.slope(&self.capacity, cell.group, f64::from(cell.score)),
+                    None => 0.0,
+                });
+                let (fx, fy) = (f64::from(corners.fx), f64::from(corners.fy));
+                let (top, bottom) = (a + fx * (b - a), c + fx * (d - c));
+                [top + fy * (bottom - top), (1.0 - fy) * (b - a) + fy * (d - c), bottom - top]
+            };
+            let (a, b, f) = (read(low), read(high), f64::from(f));
+            let [value, dx, dy] = [0, 1, 2].map(|i| a[i] + f * (b[i] - a[i]));
+            let (by_length, weight) = (factor * (value + missing), f64::from(e.weight));
+            let by = factor * f64::from(e.length) * weight * self.percent;
+            let border =
+                elements.view_slope(&e).map(|s| s * by_length * f64::from(e.length) * self.percent);
+            *place = [
+                by * dx * f64::from(self.grid.sx) + border[0],
+                by * dy * f64::from(self.grid.sy) + border[1],
+                by_length * weight * self.percent,
+                by * (b[0] - a[0]) * f64::from(PER_RADIAN),
+            ];
+            place.iter_mut().filter(|g| !g.is_finite()).for_each(|g| *g = 0.0);
+        }
     }
 }
 

@@ -15,7 +15,6 @@ pub mod distance_transform;
 pub mod elements;
 pub mod error;
 pub mod features;
-mod field;
 pub mod keypoints;
 pub mod mask;
 mod nearest;

@@ -4,7 +4,7 @@
 //! of measuring them one by one; among equally near edges the first one counts.
 
 use super::distance_transform::{Columns, Envelope, FARTHEST};
-use super::field::{Edge, Edges};
+use super::elements::{Edge, Edges};
 use pcadlang_numerics::num::simd::vectorised;
 
 /// Nearest edges of a grid's samples.

@@ -62,7 +62,7 @@ impl Equivalent<FullName> for NameRef<'_> {
 /// argument by name.
 pub type Defaults = FxHashMap<(String, String), Value>;
 
-/// What a host does with a program's inputs before the program is compiled.
+/// Prepares a program's inputs for a host before the program is compiled.
 pub trait InputHook: fmt::Debug + Send + Sync {
     /// Completes the `data` items that were given and the defaults of arguments.
     fn prepare(&self, data: &mut IndexMap<String, Value>, defaults: &mut Defaults);
@@ -75,7 +75,7 @@ pub trait InputHook: fmt::Debug + Send + Sync {
 #[derive(Clone, Debug)]
 pub struct Table {
     entries: IndexMap<FullName, Builtin, FxBuildHasher>,
-    /// What prepares the inputs of programs.
+    /// Prepare the inputs of programs.
     pub hooks: Vec<Arc<dyn InputHook>>,
 }
 

@@ -189,7 +189,7 @@ const SIDES_OF_ROUND: u32 = 96;
 struct LatheArgs {
     profiles: Vec<Profile>,
     sides: u32,
-    /// Whether it is drawn without a mesh where it is the only object.
+    /// It is drawn without a mesh where it is the only object.
     round: bool,
     wall: Wall,
     caps: Caps,

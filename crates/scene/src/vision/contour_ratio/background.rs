@@ -7,8 +7,8 @@
 //! Distances are counted per tile, tiles are summed to windows centred on tiles, and
 //! densities are interpolated linearly between window centres and between bin centres.
 
-use super::super::field::Edges;
-use super::options::ContourRatioOptions;
+use super::super::elements::Edges;
+use super::ContourRatioOptions;
 use super::ratio::Ratio;
 use pcadlang_numerics::num::simd::vectorised;
 

@@ -8,7 +8,7 @@
 //! Edges are grouped, and not limited one by one, because a piece of contour at a coarse
 //! resolution is longer than an edge pixel.
 
-use super::super::field::{CHANNELS, Edges};
+use super::super::elements::{CHANNELS, Edges};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 

@@ -7,7 +7,7 @@
 //! the nearest single precision number, about once in many thousand scores, the plain
 //! formula decides.
 
-use super::options::ContourRatioOptions;
+use super::ContourRatioOptions;
 use pcadlang_numerics::num::simd::vectorised;
 use pcadlang_numerics::num::wide::{exp, ln};
 use std::f64::consts::PI;
