@@ -17,7 +17,6 @@ pub mod error;
 pub mod features;
 pub mod keypoints;
 pub mod mask;
-mod nearest;
 pub mod pictures;
 pub mod region;
 

@@ -1,20 +1,22 @@
 //! The kinds of data that the scene brings: photographs, maps, bodies, meshes, keypoints,
 //! detectors.
 
-mod armature;
-mod options;
-
-use super::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue, SolidValue};
+use super::{
+    ArmatureValue, DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue, SolidValue,
+};
 use pcadlang_engine::lang::builtins::data::{
     DataFormat, FILE, Literal, Options, ReadRelative, kind, unreadable,
 };
 use pcadlang_engine::lang::builtins::{Arg, Default, Row, Type, arg, flag, num, opt, word};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
-use pcadlang_scene::geom::{FileFrame, GeomError, Solid, gltf, obj};
+use pcadlang_scene::geom::armature::{Armature, morphs_from_json, rig_from_json};
+use pcadlang_scene::geom::{FileFrame, GeomError, Solid, UpAxis, gltf, obj};
+use pcadlang_scene::vision::file_detector::Output;
 use pcadlang_scene::vision::keypoints::{self, Keypoints, People};
+use pcadlang_scene::vision::soft_map::Shows;
 use pcadlang_scene::vision::{
-    ContourMap, FileDetector, Limits, VisionError, depth, mask, npy, photo,
+    ContourMap, FileDetector, Limits, NetworkOptions, VisionError, depth, mask, npy, photo,
 };
 use std::sync::Arc;
 
@@ -88,7 +90,7 @@ pub(super) const TABLE: &[Row] = &[
          morphs in the same folder: see `docs/howto/bodies.md`. `up` and `unit` apply to glTF.",
         || {
             Arc::new(Shape {
-                load: armature::load,
+                load: armature,
                 example: "armature(\"file.glb\", up = \"z\", unit = 0.01)",
             })
         },
@@ -163,7 +165,7 @@ impl DataFormat for DetectorFile {
         options: &Options,
         _: &ReadRelative,
     ) -> Result<Value, Fault> {
-        let network = options::network(options).map_err(|why| unreadable(file, &why))?;
+        let network = network(options).map_err(|why| unreadable(file, &why))?;
         FileDetector::read(bytes, &network)
             .map(|d| Value::object(DetectorValue(Some(d.into()))))
             .map_err(|e| unreadable(file, &e.to_string()))
@@ -174,7 +176,7 @@ impl DataFormat for DetectorFile {
     }
 
     fn check_option(&self, name: &str, value: &Literal) -> Result<(), String> {
-        options::network(&Options::single(name, value.clone())).map(|_| ())
+        network(&Options::single(name, value.clone())).map(|_| ())
     }
 
     fn example(&self) -> Option<&'static str> {
@@ -185,7 +187,7 @@ impl DataFormat for DetectorFile {
 /// A mesh or an armature, in a frame of its own.
 #[derive(Debug)]
 struct Shape {
-    load: fn(&str, &[u8], &FileFrame, &ReadRelative) -> Result<Value, String>,
+    load: fn(&str, &[u8], &FileFrame, &ReadRelative) -> Result<Value, GeomError>,
     example: &'static str,
 }
 
@@ -197,13 +199,12 @@ impl DataFormat for Shape {
         options: &Options,
         beside: &ReadRelative,
     ) -> Result<Value, Fault> {
-        options::frame(options)
-            .and_then(|frame| (self.load)(file, bytes, &frame, beside))
-            .map_err(|why| unreadable(file, &why))
+        let frame = frame(options).map_err(|why| unreadable(file, &why))?;
+        (self.load)(file, bytes, &frame, beside).map_err(|e| unreadable(file, &e.to_string()))
     }
 
     fn check_option(&self, name: &str, value: &Literal) -> Result<(), String> {
-        options::frame(&Options::single(name, value.clone())).map(|_| ())
+        frame(&Options::single(name, value.clone())).map(|_| ())
     }
 
     fn example(&self) -> Option<&'static str> {
@@ -216,13 +217,49 @@ fn mesh(
     bytes: &[u8],
     frame: &FileFrame,
     beside: &ReadRelative,
-) -> Result<Value, String> {
+) -> Result<Value, GeomError> {
     let mesh = match gltf::is_gltf(file, bytes) {
-        true => gltf::load(bytes, frame, beside).and_then(gltf::Loaded::mesh),
-        false => obj::load_in(bytes, frame),
+        true => gltf::load(bytes, frame, beside)?.mesh()?,
+        false => obj::load_in(bytes, frame)?,
     };
-    mesh.map(|m| Value::object(SolidValue(Solid::new(Arc::new(m)))))
-        .map_err(|e: GeomError| e.to_string())
+    Ok(Value::object(SolidValue(Solid::new(Arc::new(mesh)))))
+}
+
+/// Reads a glTF file, or a rig, its mesh, and its morphs if it names some.
+fn armature(
+    file: &str,
+    bytes: &[u8],
+    frame: &FileFrame,
+    beside: &ReadRelative,
+) -> Result<Value, GeomError> {
+    let invalid = |why: &str| GeomError::Invalid(why.to_owned());
+    let value = |body: Armature| Value::object(ArmatureValue(Arc::new(body)));
+    if gltf::is_gltf(file, bytes) {
+        let loaded = gltf::load(bytes, frame, beside)?;
+        if loaded.rig.is_none() {
+            return Err(invalid(
+                "the glTF file has no skin, so it does not define which joint moves which \
+                 vertices; read it with mesh(…) and rig it with scene.autorig",
+            ));
+        }
+        return loaded.armature().map(value);
+    }
+    if *frame != FileFrame::default() {
+        return Err(invalid(
+            "`up` and `unit` are for glTF files; a rig file is in the scene's axes and units",
+        ));
+    }
+    let file = rig_from_json(bytes)?;
+    let within = |path: &str, e: GeomError| GeomError::Invalid(format!("{path}: {e}"));
+    let read = |path: &str| beside(path).map_err(GeomError::Invalid);
+    let mesh = obj::indexed(&read(&file.mesh)?).map_err(|e| within(&file.mesh, e))?;
+    let rig = file.rig.clone();
+    let mut body = Armature::new(file.rig, mesh.positions, mesh.triangles, file.influences)?;
+    if let Some(path) = &file.morphs {
+        let morphs = morphs_from_json(&read(path)?, &rig).map_err(|e| within(path, e))?;
+        body = body.with_morphs(morphs).map_err(|e| within(path, e))?;
+    }
+    Ok(value(body))
 }
 
 /// A person's joints; `#ID` after the path selects the person.
@@ -262,4 +299,75 @@ pub fn load_keypoints(file: &str, bytes: &[u8], picture: Option<&str>) -> Result
         let fault = Fault::new(FaultKind::Other, format!("{path}: {}", e.message));
         e.hint.into_iter().fold(fault, Fault::with_hint)
     })
+}
+
+/// The axes and the unit of a mesh file.
+///
+/// # Errors
+/// A value that does not fit: a message for the user.
+fn frame(options: &Options) -> Result<FileFrame, String> {
+    let (mut up, mut unit) = (UpAxis::default(), 1.0);
+    for (name, value) in options.iter() {
+        match (name, value) {
+            ("up", Literal::Str(axis)) => {
+                up = match &**axis {
+                    "x" => UpAxis::X,
+                    "y" => UpAxis::Y,
+                    "z" => UpAxis::Z,
+                    other => {
+                        return Err(format!("`up` must be \"x\", \"y\" or \"z\", not \"{other}\""));
+                    }
+                };
+            }
+            ("up", _) => return Err("`up` must be an axis in quotes".into()),
+            ("unit", Literal::Num(x)) => unit = *x,
+            ("unit", _) => return Err("`unit` must be a literal number".into()),
+            _ => {}
+        }
+    }
+    FileFrame::new(up, unit).map_err(|e| e.to_string())
+}
+
+/// How a network takes its picture and gives its map.
+///
+/// # Errors
+/// A value that does not fit: a message for the user.
+fn network(options: &Options) -> Result<NetworkOptions, String> {
+    let mut network = NetworkOptions::default();
+    for (name, value) in options.iter() {
+        let word = |ways: [&str; 2]| match value {
+            Literal::Str(s) if **s == *ways[0] => Ok(false),
+            Literal::Str(s) if **s == *ways[1] => Ok(true),
+            _ => Err(format!("`{name}` must be \"{}\" or \"{}\"", ways[0], ways[1])),
+        };
+        let channels = || match value {
+            Literal::Num(x) => Ok([*x as f32; 3]),
+            Literal::Nums(xs) if xs.len() == 3 => Ok([xs[0], xs[1], xs[2]].map(|x| x as f32)),
+            _ => Err(format!("`{name}` must be a literal number or a list of three")),
+        };
+        match (name, value) {
+            ("colours", _) => network.bgr = word(["rgb", "bgr"])?,
+            ("shows", _) => {
+                network.shows = match word(["contours", "objects"])? {
+                    true => Shows::Objects,
+                    false => Shows::Contours,
+                }
+            }
+            ("white", Literal::Num(x)) => network.white = *x as f32,
+            ("white", _) => return Err("`white` must be a literal number".into()),
+            ("mean", _) => network.mean = channels()?,
+            ("spread", _) => network.spread = channels()?,
+            ("logits", Literal::Bool(b)) => network.logits = *b,
+            ("logits", _) => return Err("`logits` must be true or false".into()),
+            ("output", Literal::Str(name)) => network.output = Output::Named(name.to_string()),
+            ("output", Literal::Num(n)) if *n >= 1.0 && *n <= 1e6 && n.fract() == 0.0 => {
+                network.output = Output::Number(*n as usize)
+            }
+            ("output", _) => {
+                return Err("`output` must be a name in quotes or a number from 1".into());
+            }
+            _ => {}
+        }
+    }
+    Ok(network)
 }
