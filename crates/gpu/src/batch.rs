@@ -6,7 +6,7 @@
 use crate::layout::{Draw, REVOLUTION, SIDES, Scene as Item};
 use crate::scenes::Scene;
 use crate::topologies::{Place, Topologies};
-use crate::vertices::{Source, Vertices};
+use crate::vertices::{VertexData, Vertices};
 use pcadlang_numerics::platform::threads::Pool;
 use pcadlang_scene::geom::{Revolution, Topology};
 use rustc_hash::FxHashMap;
@@ -107,7 +107,7 @@ struct Task<'a> {
     draws: Vec<Draw>,
     for_cpu: Vec<bool>,
     most: u32,
-    sources: Vec<(usize, Source<'a>)>,
+    sources: Vec<(usize, VertexData<'a>)>,
     /// The number of a source, by address: all are held by the scenes.
     known: FxHashMap<usize, u32>,
     /// By place in the solid, the topology met last: most solids differ in vertices only.
@@ -163,7 +163,7 @@ impl<'a> Task<'a> {
             if place.vertices > count || mesh.normals.len() < count as usize {
                 return None;
             }
-            let positions = self.source(Arc::as_ptr(mesh) as usize, || Source::Mesh(mesh));
+            let positions = self.source(Arc::as_ptr(mesh) as usize, || VertexData::Mesh(mesh));
             self.draws.push(Draw {
                 positions,
                 normals: 3 * count,
@@ -188,7 +188,7 @@ impl<'a> Task<'a> {
         }
         let count = u32::try_from(surface.rings().len()).ok()?.checked_mul(SIDES)?;
         let place = place.flatten()?;
-        let positions = self.source(Arc::as_ptr(surface) as usize, || Source::Rings(surface));
+        let positions = self.source(Arc::as_ptr(surface) as usize, || VertexData::Rings(surface));
         let mut draw = Draw { positions, count, ..draw.with(&place) };
         draw.flags |= REVOLUTION;
         self.draws.push(draw);
@@ -196,7 +196,7 @@ impl<'a> Task<'a> {
     }
 
     /// The number of a source.
-    fn source(&mut self, address: usize, make: impl FnOnce() -> Source<'a>) -> u32 {
+    fn source(&mut self, address: usize, make: impl FnOnce() -> VertexData<'a>) -> u32 {
         let sources = &mut self.sources;
         *self.known.entry(address).or_insert_with(|| {
             sources.push((address, make()));

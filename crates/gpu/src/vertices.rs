@@ -14,7 +14,7 @@ const BLOCK: usize = 1 << 16;
 
 /// What the list consists of.
 #[derive(Clone, Copy)]
-pub enum Source<'a> {
+pub enum VertexData<'a> {
     /// Positions, then normals.
     Mesh(&'a Mesh),
     Rings(&'a Revolution),
@@ -52,7 +52,7 @@ impl<'a> Vertices<'a> {
     }
 
     /// Where the vertices of a source are, which is known by its address.
-    pub fn add(&mut self, address: usize, source: &Source<'a>) -> u32 {
+    pub fn add(&mut self, address: usize, source: &VertexData<'a>) -> u32 {
         let (parts, numbers) = (&mut self.parts, &mut self.numbers);
         *self.known.entry(address).or_insert_with(|| {
             let at = *numbers;
@@ -61,11 +61,11 @@ impl<'a> Vertices<'a> {
                 *numbers += count;
             };
             match source {
-                Source::Mesh(mesh) => {
+                VertexData::Mesh(mesh) => {
                     part(3 * mesh.positions.len(), Part::Positions(mesh));
                     part(3 * mesh.positions.len(), Part::Normals(mesh));
                 }
-                Source::Rings(surface) => part(4 * surface.rings().len(), Part::Rings(surface)),
+                VertexData::Rings(surface) => part(4 * surface.rings().len(), Part::Rings(surface)),
             }
             at as u32
         })

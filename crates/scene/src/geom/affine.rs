@@ -48,7 +48,7 @@ impl Affine {
         if self.is_mirrored() { -1.0 * cofactor } else { cofactor }
     }
 
-    /// Whether the map changes handedness.
+    /// True if the map changes handedness.
     pub fn is_mirrored(&self) -> bool {
         self.0.matrix3.determinant() < 0.0
     }
@@ -72,7 +72,7 @@ impl Affine {
         (d != 0.0 && d.is_finite()).then(|| Affine(self.0.inverse())).filter(Affine::is_finite)
     }
 
-    /// Whether all components are finite.
+    /// True if all components are finite.
     pub fn is_finite(&self) -> bool {
         self.0.is_finite()
     }

@@ -95,7 +95,6 @@ impl Solid {
             mesh: Arc::new(revolve(&strips, sides, closed, count)),
             affine: Affine::IDENTITY,
             first_part: 0,
-            skin: None,
         }))
     }
 }
@@ -163,7 +162,7 @@ fn vjp_layout(
 /// The path that a lathe sweeps.
 struct Layout<T> {
     strips: Vec<Strip<T>>,
-    /// Whether the path ends where it starts.
+    /// True if the path ends where it starts.
     closed: bool,
 }
 

@@ -19,17 +19,17 @@ pub struct Edge {
     pub vertices: [u32; 2],
     /// The adjacent faces; the second is [`NO_FACE`] on a boundary.
     pub faces: [u32; 2],
-    /// Whether the surface bends sharply here.
+    /// True if the surface bends sharply here.
     pub crease: bool,
 }
 
 impl Edge {
-    /// Whether only one side has a face.
+    /// True if only one side has a face.
     pub fn is_boundary(&self) -> bool {
         self.faces[1] == NO_FACE
     }
 
-    /// Whether it shows as a line from every viewpoint: a crease or a boundary.
+    /// True if it shows as a line from every viewpoint: a crease or a boundary.
     pub fn is_sharp(&self) -> bool {
         self.crease || self.is_boundary()
     }
@@ -91,7 +91,7 @@ impl Edges {
         firsts.zip(&self.runs).map(|(first, past)| &self.list[first..*past])
     }
 
-    /// Whether there are boundary edges.
+    /// True if there are boundary edges.
     pub fn open(&self) -> bool {
         self.open
     }
@@ -125,7 +125,7 @@ pub struct Topology {
     pub part_names: Vec<Arc<str>>,
     /// The edges.
     pub edges: Edges,
-    /// Whether the faces are known to enclose a body without crossing each other. Seen
+    /// True if the faces are known to enclose a body without crossing each other. Seen
     /// from outside, faces that point away from the camera are then hidden by others and
     /// need not be drawn. Meshes from files do not promise this.
     pub encloses: bool,

@@ -67,7 +67,7 @@ impl Tolerance {
         (size > SMALLEST).then_some(Tolerance { tip: TIP * size, r: 1e-6 * size, y })
     }
 
-    /// Whether a radius counts as on the axis; radii have been raised to `tip` at least.
+    /// True if a radius counts as on the axis; radii have been raised to `tip` at least.
     pub fn is_tip(&self, r: f64) -> bool {
         r <= self.tip
     }
@@ -139,7 +139,7 @@ impl<T: Real> OuterPath<T> {
     }
 }
 
-/// Whether the path a, b, c bends by less than the crease angle.
+/// True if the path a, b, c bends by less than the crease angle.
 fn is_smooth<T: Real>(a: (T, T), b: (T, T), c: (T, T)) -> bool {
     let (a, b, c) = (values(a), values(b), values(c));
     let (u, v) = ((b.0 - a.0, b.1 - a.1), (c.0 - b.0, c.1 - b.1));
@@ -147,7 +147,7 @@ fn is_smooth<T: Real>(a: (T, T), b: (T, T), c: (T, T)) -> bool {
     dot >= SMOOTH_COS * libm::hypot(u.0, u.1) * libm::hypot(v.0, v.1)
 }
 
-/// Whether a path that ends at the axis is nearly perpendicular to it there.
+/// True if a path that ends at the axis is nearly perpendicular to it there.
 fn is_dome<T: Real>(tip: (T, T), next: (T, T)) -> bool {
     let (tip, next) = (values(tip), values(next));
     (next.1 - tip.1).abs() <= DOME_SLOPE * (next.0 - tip.0).abs()

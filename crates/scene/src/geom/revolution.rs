@@ -99,7 +99,7 @@ impl Revolution {
         &self.rims
     }
 
-    /// Whether it surely encloses a body, with its normals pointing out of it.
+    /// True if it surely encloses a body, with its normals pointing out of it.
     pub fn encloses(&self) -> bool {
         self.encloses
     }
@@ -110,7 +110,7 @@ impl Revolution {
     }
 }
 
-/// Whether a path surely does not cross itself: it goes up, then down again inside.
+/// True if a path surely does not cross itself: it goes up, then down again inside.
 fn is_simple(rings: &[Ring]) -> bool {
     let top = rings.windows(2).position(|pair| pair[1].y < pair[0].y);
     let top = top.unwrap_or(rings.len().saturating_sub(1));

@@ -21,7 +21,7 @@ pub(super) struct Strip<T = f64> {
     pub points: Vec<(T, T)>,
     /// The part of each segment.
     pub parts: Vec<u16>,
-    /// Whether the seam to the previous strip is smooth although its normals differ.
+    /// True if the seam to the previous strip is smooth although its normals differ.
     pub blend: bool,
 }
 
@@ -31,7 +31,7 @@ struct Signature {
     sides: u32,
     closed: bool,
     part_count: u16,
-    /// Whether the path never goes down, and so cannot cross itself.
+    /// True if the path never goes down, and so cannot cross itself.
     rising: bool,
     /// For each strip: the number of points, flags for poles and blend, then the parts of
     /// its segments.

@@ -7,7 +7,6 @@
 
 use super::landmark::{Landmark, unique};
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
-use super::posed_skin::PosedSkin;
 use super::revolution::Revolution;
 use super::{Affine, Bounds, Edge, Edges, GeomError, Mesh, NO_FACE, Topology, outer};
 use glam::{DAffine3, DMat3, DVec3};
@@ -24,8 +23,6 @@ pub struct Instance {
     pub affine: Affine,
     /// The offset added to its part numbers.
     pub first_part: u16,
-    /// The body it is a part of, if it is the part of a posed one.
-    pub skin: Option<PosedSkin>,
 }
 
 /// A list that is computed on first use.
@@ -90,7 +87,7 @@ impl Meshes {
         MeshesMark(Arc::downgrade(&self.0))
     }
 
-    /// Whether the mark identifies this list.
+    /// True if the mark identifies this list.
     pub fn is(&self, mark: &MeshesMark) -> bool {
         std::ptr::eq(mark.0.as_ptr(), Arc::as_ptr(&self.0))
     }
@@ -151,12 +148,7 @@ fn ready<T: Send + Sync + 'static>(list: Arc<[T]>) -> Arc<Lazy<T>> {
 impl Solid {
     /// A solid of one mesh, placed by the identity.
     pub fn new(mesh: Arc<Mesh>) -> Solid {
-        Solid::of(Arc::new([Instance {
-            mesh,
-            affine: Affine::IDENTITY,
-            first_part: 0,
-            skin: None,
-        }]))
+        Solid::of(Arc::new([Instance { mesh, affine: Affine::IDENTITY, first_part: 0 }]))
     }
 
     /// A solid of placed meshes, without landmarks.

@@ -26,7 +26,7 @@ pub enum CameraError {
     Invalid {
         /// The key.
         key: &'static str,
-        /// What it must be.
+        /// The values that are accepted.
         wanted: &'static str,
     },
 }

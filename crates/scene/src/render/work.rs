@@ -4,7 +4,7 @@ use crate::geom::Mesh;
 use std::cell::Cell;
 use std::ops::Sub;
 
-/// What was drawn for contours, and what was skipped.
+/// Counts of drawn and skipped work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
     /// Pictures that were drawn completely.

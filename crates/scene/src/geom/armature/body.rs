@@ -322,21 +322,6 @@ impl Armature {
         &self.skin.parts
     }
 
-    /// A number that bodies share if they differ in shape only.
-    pub(super) fn identity(&self) -> usize {
-        Arc::as_ptr(&self.skin) as usize
-    }
-
-    /// The joints that move a part, by its place.
-    pub(super) fn joints_of_part(&self, part: usize) -> &[u16] {
-        self.skin.parts.get(part).map_or(&[], |p| &p.joints)
-    }
-
-    /// The normals of the vertices at rest.
-    pub(super) fn normals(&self) -> &[Vec3] {
-        &self.surface.normals
-    }
-
     /// Returns a part deformed by the transforms of all joints.
     pub(super) fn skinned(&self, number: usize, transforms: &[Affine3A]) -> Instance {
         let (rest, part): (&Surface, &Part) = (&self.surface, &self.skin.parts[number]);
@@ -356,7 +341,7 @@ impl Armature {
                 .push(Vec3::from((cofactor(&m.matrix3) * Vec3A::from(n)).normalize_or(Vec3A::Y)));
         }
         let mesh = Arc::new(Mesh::of(positions, normals, Arc::clone(&part.topology)));
-        Instance { mesh, affine: Affine::IDENTITY, first_part: part.joint, skin: None }
+        Instance { mesh, affine: Affine::IDENTITY, first_part: part.joint }
     }
 
     /// The vector-Jacobian product of posing with respect to the joints' transforms,

@@ -9,7 +9,6 @@ mod pose;
 mod posed;
 mod rig;
 mod rig_json;
-mod skinned;
 mod stretch;
 mod torque;
 

@@ -57,7 +57,7 @@ impl Morph {
     }
 }
 
-/// What a keypoint follows when the shape changes.
+/// The vertices or joint that a keypoint follows when the shape changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Anchor {
     /// The head of its joint, if the keypoint is there.

@@ -37,7 +37,7 @@ impl JointPose {
         JointPose { turn: Turn::Vector(v), ..JointPose::REST }
     }
 
-    /// Whether the joint is neither pulled nor scaled.
+    /// True if the joint is neither pulled nor scaled.
     pub(super) fn only_turns(&self) -> bool {
         self.location == DVec3::ZERO && self.scale == DVec3::ONE
     }
@@ -65,7 +65,7 @@ pub struct Rules {
     /// For each joint, whether it stops the pull of location handles below it. Joints
     /// beyond the end of the list do not.
     pub stops: Vec<bool>,
-    /// Whether a joint's scale also acts on its descendants.
+    /// True if a joint's scale also acts on its descendants.
     pub inherit_scale: bool,
 }
 

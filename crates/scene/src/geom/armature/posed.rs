@@ -3,7 +3,6 @@
 
 use super::body::{Armature, Part};
 use super::{JointPose, Keypoint, Rules};
-use crate::geom::posed_skin::{PosedSkin, Skinned};
 use crate::geom::{GeomError, Instance, Landmark, Solid};
 use glam::{Affine3A, DAffine3};
 use std::sync::{Arc, OnceLock};
@@ -16,7 +15,7 @@ pub struct Posed(Arc<Pose>);
 #[derive(Debug)]
 struct Pose {
     body: Arc<Armature>,
-    transforms: Arc<[Affine3A]>,
+    transforms: Vec<Affine3A>,
     parts: OnceLock<Vec<Instance>>,
 }
 
@@ -38,14 +37,7 @@ impl Pose {
                     let same = joints.all(|j| moved(transforms, j) == moved(&self.transforms, j));
                     parts.get(i).filter(|_| same).cloned()
                 });
-                same.unwrap_or_else(|| {
-                    let skin = PosedSkin {
-                        body: Arc::clone(&self.body) as Arc<dyn Skinned>,
-                        transforms: Arc::clone(&self.transforms),
-                        part: i,
-                    };
-                    Instance { skin: Some(skin), ..self.body.skinned(i, &self.transforms) }
-                })
+                same.unwrap_or_else(|| self.body.skinned(i, &self.transforms))
             };
             self.body.parts().iter().enumerate().map(make).collect()
         })
@@ -62,8 +54,8 @@ impl Posed {
     ) -> (Posed, impl FnOnce() -> Vec<Instance> + Send + 'static) {
         let is_made = |b: &&Posed| Arc::ptr_eq(&b.0.body, body) && b.0.parts.get().is_some();
         let before = before.filter(is_made).map(|b| Arc::clone(&b.0));
-        let (body, transforms) = (Arc::clone(body), transforms.into());
-        let pose = Arc::new(Pose { body, transforms, parts: OnceLock::new() });
+        let pose = Pose { body: Arc::clone(body), transforms, parts: OnceLock::new() };
+        let pose = Arc::new(pose);
         let own = Arc::clone(&pose);
         (Posed(pose), move || own.parts(before.as_deref()).to_vec())
     }

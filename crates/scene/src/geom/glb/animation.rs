@@ -1,14 +1,12 @@
-//! Several states of a scene as one animation: by the joints of its bodies where it has
-//! any, otherwise by moving vertices.
+//! Several states of a scene as one animation, by moving vertices.
 
 use super::channels::Animation;
 use super::document::Document;
-use super::{morphs, skins};
+use super::morphs;
 use crate::geom::{GeomError, Solid};
 
 /// Returns the bytes of a `.glb` file that plays states one after another, `seconds`
-/// apart. A body keeps its skin: its joints move. Anything else moves by morph targets;
-/// where the triangles change between two states, one mesh is replaced by another.
+/// apart. Vertices move by morph targets; where the triangles change between two states, one mesh is replaced by another.
 ///
 /// # Errors
 /// If there are no states, or one has no mesh.
@@ -19,9 +17,7 @@ pub fn write_animation(states: &[Solid], seconds: f64) -> Result<Vec<u8>, GeomEr
     let mut d = Document::default();
     let times: Vec<f32> = (0..states.len()).map(|i| (i as f64 * seconds) as f32).collect();
     let mut animation = Animation::at(d.numbers(&times));
-    if !skins::add(&mut d, &mut animation, states) {
-        morphs::add(&mut d, &mut animation, states)?;
-    }
+    morphs::add(&mut d, &mut animation, states)?;
     d.animation(animation.finish());
     Ok(d.finish())
 }

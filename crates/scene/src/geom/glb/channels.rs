@@ -1,4 +1,4 @@
-//! What of a glTF file moves, and how.
+//! The animation of a glTF file: channels and samplers.
 
 use serde_json::{Value, json};
 

@@ -1,12 +1,11 @@
 //! The parts that every glTF file has: buffer, views, accessors, nodes.
 
-use glam::{Mat4, Quat, Vec3};
+use glam::Vec3;
 use serde_json::{Value, json};
 
 /// Component types (glTF 2.0, section 3.6.2.2).
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
-const UNSIGNED_SHORT: u32 = 5123;
 
 /// A file under way. Functions that add something return its index.
 #[derive(Default)]
@@ -15,10 +14,8 @@ pub struct Document {
     views: Vec<Value>,
     accessors: Vec<Value>,
     nodes: Vec<Value>,
-    roots: Vec<usize>,
     meshes: Vec<Value>,
-    skins: Vec<Value>,
-    animations: Vec<Value>,
+    animation: Option<Value>,
 }
 
 impl Document {
@@ -67,28 +64,6 @@ impl Document {
         self.accessor(data, Some(34963), accessor)
     }
 
-    /// Adds the joints that move each vertex, and their weights.
-    pub fn influences(&mut self, joints: &[[u16; 4]], weights: &[[f32; 4]]) -> [usize; 2] {
-        let data = joints.iter().flatten().flat_map(|i| i.to_le_bytes()).collect();
-        let accessor =
-            json!({ "componentType": UNSIGNED_SHORT, "count": joints.len(), "type": "VEC4" });
-        let joints = self.accessor(data, Some(34962), accessor);
-        let accessor = json!({ "componentType": FLOAT, "count": weights.len(), "type": "VEC4" });
-        let weights =
-            self.accessor(bytes(weights.iter().flatten().copied()), Some(34962), accessor);
-        [joints, weights]
-    }
-
-    /// Adds matrices.
-    pub fn matrices(&mut self, all: &[Mat4]) -> usize {
-        let data = bytes(all.iter().flat_map(Mat4::to_cols_array));
-        self.accessor(
-            data,
-            None,
-            json!({ "componentType": FLOAT, "count": all.len(), "type": "MAT4" }),
-        )
-    }
-
     /// Adds the times of an animation, or the weights of its targets.
     pub fn numbers(&mut self, all: &[f32]) -> usize {
         let low = all.iter().copied().reduce(f32::min).unwrap_or_default();
@@ -108,49 +83,21 @@ impl Document {
         )
     }
 
-    /// Adds rotations of an animation.
-    pub fn rotations(&mut self, all: &[Quat]) -> usize {
-        let data = bytes(all.iter().flat_map(|q| q.to_array()));
-        self.accessor(
-            data,
-            None,
-            json!({ "componentType": FLOAT, "count": all.len(), "type": "VEC4" }),
-        )
-    }
-
     /// Adds a mesh.
     pub fn mesh(&mut self, mesh: Value) -> usize {
         self.meshes.push(mesh);
         self.meshes.len() - 1
     }
 
-    /// Adds a skin.
-    pub fn skin(&mut self, skin: Value) -> usize {
-        self.skins.push(skin);
-        self.skins.len() - 1
-    }
-
-    /// Adds a node that another one lists as its child.
+    /// Adds a node of the scene.
     pub fn node(&mut self, node: Value) -> usize {
         self.nodes.push(node);
         self.nodes.len() - 1
     }
 
-    /// Adds a node of the scene.
-    pub fn root(&mut self, node: Value) -> usize {
-        let index = self.node(node);
-        self.roots.push(index);
-        index
-    }
-
-    /// Changes a node.
-    pub fn node_mut(&mut self, index: usize) -> &mut Value {
-        &mut self.nodes[index]
-    }
-
-    /// Adds an animation.
+    /// Sets the animation.
     pub fn animation(&mut self, animation: Value) {
-        self.animations.push(animation);
+        self.animation = Some(animation);
     }
 
     /// Returns the bytes of the file.
@@ -158,18 +105,16 @@ impl Document {
         let mut document = json!({
             "asset": { "version": "2.0", "generator": "pcadlang" },
             "scene": 0,
-            "scenes": [{ "nodes": self.roots }],
+            "scenes": [{ "nodes": (0..self.nodes.len()).collect::<Vec<_>>() }],
             "nodes": self.nodes,
             "meshes": self.meshes,
             "buffers": [{ "byteLength": self.bin.len() }],
             "bufferViews": self.views,
             "accessors": self.accessors,
         });
-        // Empty lists are not allowed.
-        for (name, all) in [("skins", self.skins), ("animations", self.animations)] {
-            if !all.is_empty() {
-                document[name] = json!(all);
-            }
+        // An empty list is not allowed.
+        if let Some(animation) = self.animation {
+            document["animations"] = json!([animation]);
         }
         let mut text = document.to_string().into_bytes();
         text.resize(text.len().next_multiple_of(4), b' ');

@@ -8,7 +8,6 @@ mod animation;
 mod channels;
 mod document;
 mod morphs;
-mod skins;
 
 use super::Mesh;
 pub use animation::write_animation;
@@ -26,7 +25,7 @@ pub fn write(mesh: &Mesh) -> Vec<u8> {
             "attributes": { "POSITION": positions, "NORMAL": normals }, "indices": corners,
         }],
     }));
-    d.root(json!({ "mesh": mesh }));
+    d.node(json!({ "mesh": mesh }));
     d.finish()
 }
 

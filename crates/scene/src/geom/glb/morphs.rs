@@ -46,7 +46,7 @@ pub fn add(d: &mut Document, animation: &mut Animation, states: &[Solid]) -> Res
         }
         mesh["primitives"] = json!([primitive]);
         let mesh = d.mesh(mesh);
-        let node = d.root(json!({ "mesh": mesh, "scale": [1, 1, 1] }));
+        let node = d.node(json!({ "mesh": mesh, "scale": [1, 1, 1] }));
         if !targets.is_empty() {
             // While another mesh is shown, the weights do not matter.
             let weight = |state: usize| {

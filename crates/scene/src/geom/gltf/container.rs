@@ -28,7 +28,7 @@ fn invalid(message: impl Into<String>) -> GeomError {
     GeomError::invalid(message)
 }
 
-/// Whether a file is glTF: a GLB, JSON with the key `asset`, or a name that ends in
+/// True if a file is glTF: a GLB, JSON with the key `asset`, or a name that ends in
 /// `.gltf` or `.glb`.
 pub fn is_gltf(file: &str, bytes: &[u8]) -> bool {
     #[derive(serde::Deserialize)]

@@ -12,7 +12,7 @@ pub(super) struct Nodes {
     pub parents: Vec<Option<usize>>,
     /// The transforms from the nodes' spaces to the scene.
     pub global: Vec<DAffine3>,
-    /// Whether each node belongs to the default scene.
+    /// True if each node belongs to the default scene.
     pub drawn: Vec<bool>,
 }
 

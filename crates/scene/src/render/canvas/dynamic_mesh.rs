@@ -23,7 +23,7 @@ pub struct PlacedLayer {
 }
 
 impl PlacedLayer {
-    /// Whether it was drawn, so that it is valid in front of any static layer.
+    /// True if it was drawn, so that it is valid in front of any static layer.
     pub fn is_drawn(&self) -> bool {
         self.hidden_by.is_none()
     }

@@ -23,7 +23,7 @@ pub struct Tools {
     pub room: Room,
 }
 
-/// What a picture shows.
+/// The channels of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shows {
     /// Depth alone.

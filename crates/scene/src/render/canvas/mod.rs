@@ -1,4 +1,4 @@
-//! What successive drawings of one scene share. A view that follows another one in a node
+//! State shared by successive drawings of one scene. A view that follows another one in a node
 //! of a trace takes over its canvas, so a drawing costs what the change costs.
 //!
 //! The meshes of a scene are **layers** of a picture. Those that stand still are merged
@@ -17,7 +17,7 @@ mod picture;
 mod static_layer;
 
 use self::layer::{Shows, Tools, camera_bits};
-use self::picture::Picture;
+use self::picture::IncrementalImage;
 use super::{Camera, ContourChange, Contours};
 use crate::geom::Solid;
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
@@ -28,19 +28,19 @@ const PICTURES: usize = 4;
 
 /// A shared canvas. Clones draw on the same one; a new canvas is empty.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Canvas(Arc<Mutex<Pictures>>);
+pub(super) struct Canvas(Arc<Mutex<ImageCache>>);
 
 /// The pictures of a canvas, the one drawn last first.
 #[derive(Default)]
-struct Pictures {
-    pictures: Vec<Picture>,
+struct ImageCache {
+    pictures: Vec<IncrementalImage>,
     /// Large, and most canvases are never drawn on: made when it is needed.
     tools: Option<Box<Tools>>,
 }
 
-impl std::fmt::Debug for Pictures {
+impl std::fmt::Debug for ImageCache {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Pictures").field("count", &self.pictures.len()).finish()
+        f.debug_struct("ImageCache").field("count", &self.pictures.len()).finish()
     }
 }
 
@@ -82,7 +82,7 @@ impl Canvas {
         &self,
         solid: &Solid,
         (camera, shows): (&Camera, Shows),
-        take: impl FnOnce(&Picture) -> T,
+        take: impl FnOnce(&IncrementalImage) -> T,
     ) -> Option<T> {
         self.with_picture((camera, shows), |picture, tools| {
             if !picture.shows(solid) {
@@ -95,16 +95,16 @@ impl Canvas {
     fn with_picture<T>(
         &self,
         (camera, shows): (&Camera, Shows),
-        work: impl FnOnce(&mut Picture, &mut Tools) -> Option<T>,
+        work: impl FnOnce(&mut IncrementalImage, &mut Tools) -> Option<T>,
     ) -> Option<T> {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let Pictures { pictures, tools } = &mut *all;
+        let ImageCache { pictures, tools } = &mut *all;
         let eye = camera_bits(camera);
         match pictures.iter().position(|p| p.is_of(&eye, shows)) {
             Some(at) => pictures[..=at].rotate_right(1),
             None => {
                 pictures.truncate(PICTURES - 1);
-                pictures.insert(0, Picture::new(eye, shows));
+                pictures.insert(0, IncrementalImage::new(eye, shows));
             }
         }
         work(pictures.first_mut()?, tools.get_or_insert_default())

@@ -27,7 +27,7 @@ const MOST_PIXELS: usize = 1 << 23;
 const PATIENCE: u64 = 1024;
 
 /// The state of one camera's picture.
-pub(super) struct Picture {
+pub(super) struct IncrementalImage {
     /// The bits of the camera, and what is shown, which identify the picture.
     camera: [u64; 17],
     shows: Shows,
@@ -59,10 +59,10 @@ pub(super) struct Picture {
     refused: Option<usize>,
 }
 
-impl Picture {
+impl IncrementalImage {
     /// A picture without meshes; nothing is drawn yet.
-    pub fn new(camera: [u64; 17], shows: Shows) -> Picture {
-        Picture {
+    pub fn new(camera: [u64; 17], shows: Shows) -> IncrementalImage {
+        IncrementalImage {
             camera,
             shows,
             shown: Meshes::default(),
@@ -85,12 +85,12 @@ impl Picture {
         }
     }
 
-    /// Whether it is the picture of the camera with these bits that shows this.
+    /// True if it is the picture of the camera with these bits that shows this.
     pub fn is_of(&self, camera: &[u64; 17], shows: Shows) -> bool {
         self.shows == shows && self.camera == *camera
     }
 
-    /// Whether it shows just this solid.
+    /// True if it shows just this solid.
     pub fn shows(&self, solid: &Solid) -> bool {
         self.static_layer.is_some()
             && self.shown.len() == solid.mesh_count()
@@ -272,7 +272,7 @@ impl Picture {
 
     /// Composes the whole picture and tests all pieces.
     fn begin(&mut self, camera: &Camera) -> Option<ContourChange> {
-        let Picture { static_layer, dynamic, depth, extent, .. } = self;
+        let IncrementalImage { static_layer, dynamic, depth, extent, .. } = self;
         let static_layer = static_layer.as_mut()?;
         work::count(|work| {
             work.partial += 1;
@@ -312,7 +312,17 @@ impl Picture {
         let clock = self.clock;
         let moved = |m: &DynamicMesh| m.moved == clock;
         let anything = !same_extent || self.dynamic.iter().any(moved);
-        let Picture { static_layer, dynamic, depth, extent, rows, pixels, areas, again, .. } = self;
+        let IncrementalImage {
+            static_layer,
+            dynamic,
+            depth,
+            extent,
+            rows,
+            pixels,
+            areas,
+            again,
+            ..
+        } = self;
         let (static_layer, width) = (static_layer.as_mut()?, camera.width as usize);
         Area::join(areas);
         work::count(|work| {

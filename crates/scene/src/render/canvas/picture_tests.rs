@@ -1,4 +1,4 @@
-//! Pictures against full drawings, bit for bit, and what they skip drawing.
+//! ImageCache against full drawings, bit for bit, and what they skip drawing.
 
 use super::*;
 use crate::geom::Affine;
@@ -27,9 +27,9 @@ fn somewhere(random: &mut Uniform, reach: f64, size: f64) -> Affine {
 
 /// A picture, and the pieces that a follower of its changes has collected.
 struct Followed {
-    picture: Picture,
+    picture: IncrementalImage,
     /// The same without contours, if that is compared, too.
-    depth_alone: Option<Picture>,
+    depth_alone: Option<IncrementalImage>,
     tools: Tools,
     at: Arc<()>,
     /// The current pieces of the stationary meshes as bits, in some order.
@@ -45,7 +45,7 @@ fn bits(c: &Contours) -> Vec<[u32; 5]> {
 impl Followed {
     fn new(camera: &Camera) -> Followed {
         Followed {
-            picture: Picture::new(camera_bits(camera), Shows::Contours),
+            picture: IncrementalImage::new(camera_bits(camera), Shows::Contours),
             depth_alone: None,
             tools: Tools::default(),
             at: Arc::default(),
@@ -71,7 +71,7 @@ impl Followed {
         assert_eq!(bits(&got), bits(&wanted));
         assert_eq!(change.count, wanted.len());
         let depth = Frame::render(solid, camera, Channels::Depth).depth;
-        let is_depth = |picture: &Picture| {
+        let is_depth = |picture: &IncrementalImage| {
             picture.depth().iter().map(|d| d.to_bits()).eq(depth.iter().map(|d| d.to_bits()))
         };
         assert!(is_depth(&self.picture) && alone.is_none_or(is_depth));
@@ -120,7 +120,7 @@ fn pictures_give_what_is_drawn_at_once() {
         let moving = 1 + round as usize % 3;
         let shapes: Vec<Solid> = (0..moving).map(|_| shape(&mut random)).collect();
         let mut followers = Followed::new(&camera);
-        followers.depth_alone = Some(Picture::new(camera_bits(&camera), Shows::Depth));
+        followers.depth_alone = Some(IncrementalImage::new(camera_bits(&camera), Shows::Depth));
         for step in 0..60 {
             let before = solids.clone();
             // Far, near, and out of the picture; now and then another mesh moves as well.

@@ -60,7 +60,7 @@ impl StaticLayer {
         }
     }
 
-    /// Whether this layer hides a whole mesh, contours included, whose depth range is
+    /// True if this layer hides a whole mesh, contours included, whose depth range is
     /// `range` and whose pixels all lie in `area`.
     pub fn hides(&self, range: &DepthRange, area: &Area, camera: &Camera) -> bool {
         let (limit, width) = (Depths::hiding(self.extents[1], range), camera.width as usize);
@@ -77,7 +77,7 @@ impl StaticLayer {
                 .all(|row| self.depth.get(row).is_some_and(|row| row.iter().all(near)))
     }
 
-    /// Whether the sorted pieces are valid for a depth range.
+    /// True if the sorted pieces are valid for a depth range.
     pub fn holds(&self, extent: f64) -> bool {
         let [least, most] = self.extents;
         self.pieces.is_empty() || least <= extent && extent <= most

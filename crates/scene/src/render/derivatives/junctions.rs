@@ -19,7 +19,7 @@ use rustc_hash::FxHashMap;
 pub(in crate::render) struct Extracted<'a> {
     pub piece: Piece,
     pub origin: Origin,
-    /// What the ends of its segment lie on.
+    /// The vertices or edges that the ends of its segment lie on.
     pub ends: [End; 2],
     /// Its index among the visible pieces.
     pub seen: Option<usize>,
@@ -46,7 +46,7 @@ const MOST: usize = 64;
 /// The height of a band of pieces, in pixels.
 const BAND: f64 = 4.0;
 
-/// What the end of a segment lies on: a vertex, or an edge between two, identified by
+/// The place of the end of a segment: a vertex, or an edge between two, identified by
 /// positions in the image, which parts that share a seam have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(in crate::render) struct End([u64; 2]);
@@ -166,7 +166,7 @@ fn links(extracted: &[Extracted<'_>]) -> Links {
     links
 }
 
-/// Whether the hidden stretch that begins with piece `first`, coming from `from`, is
+/// True if the hidden stretch that begins with piece `first`, coming from `from`, is
 /// short.
 fn is_short(extracted: &[Extracted<'_>], links: &Links, first: usize, from: usize) -> bool {
     let (mut before, mut at, mut length) = (from, first, 0.0);

@@ -129,7 +129,7 @@ impl Contours {
         }
     }
 
-    /// Whether piece `i` equals this one, bit for bit.
+    /// True if piece `i` equals this one, bit for bit.
     fn is(&self, i: usize, piece: &Piece) -> bool {
         let same = |list: &[f32], x: f32| list.get(i).is_some_and(|y| y.to_bits() == x.to_bits());
         same(&self.x, piece.x)

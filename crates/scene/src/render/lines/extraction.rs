@@ -18,10 +18,10 @@ pub(in crate::render) trait Points {
     /// A vertex, as [`Vertices::point`].
     fn point(&self, v: u32) -> Point;
 
-    /// Whether all vertices are usable and beyond the near plane.
+    /// True if all vertices are usable and beyond the near plane.
     fn whole(&self) -> bool;
 
-    /// Whether a whole line of edges is too small to be seen, as its width plus height is
+    /// True if a whole line of edges is too small to be seen, as its width plus height is
     /// less than [`SPECK`].
     fn is_speck(&self, line: &[Edge]) -> bool;
 }
@@ -42,7 +42,7 @@ impl Points for Vertices<'_> {
     }
 }
 
-/// Whether a point is usable and beyond the near plane.
+/// True if a point is usable and beyond the near plane.
 fn usable(p: &Point) -> bool {
     p.nearness < f64::INFINITY
 }
@@ -61,7 +61,7 @@ pub(in crate::render) struct Origin {
     pub at: f64,
     /// The fraction of the segment's image that the piece covers.
     pub share: f64,
-    /// Whether the piece's tangent goes from the segment's first end to its second.
+    /// True if the piece's tangent goes from the segment's first end to its second.
     pub forward: bool,
 }
 
@@ -103,7 +103,7 @@ pub(in crate::render) fn extract_mesh(
     tracer.edges();
 }
 
-/// Whether a mesh has boundaries through which something can be seen, unlike holes that
+/// True if a mesh has boundaries through which something can be seen, unlike holes that
 /// are too small to be visible.
 fn is_open(mesh: &Mesh, vertices: &impl Points) -> bool {
     let edges = &mesh.topology.edges;
@@ -124,7 +124,7 @@ pub(in crate::render) struct Extractor<'a, V, F> {
     mesh: &'a Mesh,
     placement: &'a Placement,
     vertices: &'a V,
-    /// Whether the mesh has visible boundaries, so that the insides of faces may be
+    /// True if the mesh has visible boundaries, so that the insides of faces may be
     /// visible.
     open: bool,
     lens: Lens,
@@ -265,7 +265,7 @@ impl<'a, V: Points, F: FnMut(Piece, &Origin)> Extractor<'a, V, F> {
         depth.max(0.0)
     }
 
-    /// Whether a point is in the image.
+    /// True if a point is in the image.
     #[inline(always)]
     fn inside(&self, p: &Point) -> bool {
         p.x >= 0.0 && p.y >= 0.0 && p.x <= self.size[0] && p.y <= self.size[1]

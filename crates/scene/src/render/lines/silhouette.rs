@@ -33,7 +33,7 @@ pub(in crate::render) struct Batch {
     /// The vertices of each face; the sign of facing of the first one differs from the
     /// others'.
     pub corners: [[u32; 3]; MOST],
-    /// Whether there is a segment.
+    /// True if there is a segment.
     pub there: [bool; MOST],
     /// Where the ends lie along the sides from the first corner, as fractions.
     pub shares: [Row; 2],
@@ -88,7 +88,7 @@ impl Default for Batch {
 
 /// Where the segments of a batch are tested for visibility.
 pub(in crate::render) struct Located {
-    /// Whether a segment is a single piece: short and wholly inside of the image.
+    /// True if a segment is a single piece: short and wholly inside of the image.
     pub single: [bool; MOST],
     /// On the outer and the inner side: the pixel nearest to the position tested, and whether
     /// it contains it. The inner side only if both are tested.

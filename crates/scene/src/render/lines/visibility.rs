@@ -1,4 +1,4 @@
-//! Whether a piece of contour is visible, decided by testing the depth image beside it.
+//! Visibility of pieces of contour, decided by testing the depth image beside it.
 //!
 //! On a contour itself the depth image is ambiguous by a pixel, so the tests read it
 //! about one pixel to the side. This is not an exact hidden-line method: surfaces closer
@@ -49,7 +49,7 @@ pub(in crate::render) enum TestSides {
 struct Side {
     /// The pixel tested; [`NOWHERE`] if this side is not tested.
     pixel: u32,
-    /// Whether the position tested is inside the image.
+    /// True if the position tested is inside the image.
     inside: bool,
     /// How much nearer the piece's own faces reach, before this is limited relative to
     /// the depth range.
@@ -69,7 +69,7 @@ pub(in crate::render) struct Piece {
     pub tx: f32,
     pub ty: f32,
     pub length: f32,
-    /// Whether it is a crease or boundary, not a smooth silhouette.
+    /// True if it is a crease or boundary, not a smooth silhouette.
     pub edge: bool,
     /// In scene units.
     pub depth: f64,
@@ -209,7 +209,7 @@ impl<'a> Depths<'a> {
         })
     }
 
-    /// Whether the depth on this side is not nearer than the piece's `depth` less the
+    /// True if the depth on this side is not nearer than the piece's `depth` less the
     /// slack.
     #[inline]
     fn free(&self, side: &Side, depth: f64, most: f64) -> bool {
@@ -245,7 +245,7 @@ impl<'a> Depths<'a> {
         )
     }
 
-    /// Whether a test passes with a given depth at its pixel.
+    /// True if a test passes with a given depth at its pixel.
     #[inline]
     pub fn passes(&self, depth_test: &DepthTest, seen: f32) -> bool {
         f64::from(seen) >= self.least(depth_test)
@@ -258,13 +258,13 @@ impl<'a> Depths<'a> {
             - 2e-6 * range.far.abs()
     }
 
-    /// Whether a piece is visible.
+    /// True if a piece is visible.
     #[inline]
     pub fn visible(&self, piece: &Piece) -> bool {
         self.visible_by(piece, 0) || self.visible_by(piece, 1)
     }
 
-    /// Whether a piece passes its test on the first or the second side.
+    /// True if a piece passes its test on the first or the second side.
     #[inline]
     pub fn visible_by(&self, piece: &Piece, side: usize) -> bool {
         let most = self.most[usize::from(piece.edge)];

@@ -40,7 +40,7 @@ impl Area {
         Area { left, right, top, bottom }
     }
 
-    /// Whether two rectangles have pixels in common.
+    /// True if two rectangles have pixels in common.
     #[inline]
     pub fn meets(&self, other: &Area) -> bool {
         self.common(other).pixels() > 0

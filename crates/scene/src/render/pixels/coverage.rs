@@ -16,7 +16,7 @@ const FARTHEST: i64 = 1 << 60;
 /// The pixels that a triangle covers.
 pub(in crate::render) struct Coverage {
     places: [Place; 3],
-    /// Whether the corners are clockwise as seen in the image.
+    /// True if the corners are clockwise as seen in the image.
     clockwise: bool,
     /// Columns and rows, each from the first to one past the last.
     pub columns: [usize; 2],
@@ -43,7 +43,7 @@ fn units(place: Place, point: &Point) -> [i64; 2] {
     })
 }
 
-/// Whether products of two differences of coordinates fit into 64 bits.
+/// True if products of two differences of coordinates fit into 64 bits.
 #[inline(always)]
 fn is_small(corners: &[[i64; 2]; 3]) -> bool {
     corners.as_flattened().iter().all(|v| v.abs() < 1 << 29)
@@ -66,7 +66,7 @@ fn far_turn(places: &[Place; 3], points: &[Point; 3]) -> f64 {
     ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).signum() as f64
 }
 
-/// Whether corners are known to have the orientation `back`, as in [`Coverage::new`].
+/// True if corners are known to have the orientation `back`, as in [`Coverage::new`].
 #[inline(always)]
 pub(in crate::render) fn is_turned(places: [Place; 3], back: f64) -> bool {
     let [a, b, c] = places;

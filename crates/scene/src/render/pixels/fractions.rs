@@ -22,7 +22,7 @@ const FINER: u32 = 8;
 /// The most pixels of a finer picture, and the most words of samples.
 const MOST: usize = 1 << 22;
 
-/// What a solid covers.
+/// The coverage of each pixel by a solid.
 pub(in crate::render) struct Fractions {
     /// The fraction of every pixel, 0 to 1, row by row.
     pub values: Arc<[f32]>,
@@ -132,7 +132,7 @@ pub(in crate::render) fn in_samples(p: &Point) -> [f64; 2] {
     [p.x * COLUMNS as f64 - 0.5, p.y * ROWS as f64 - 0.5]
 }
 
-/// Whether a triangle has the orientation `back`, as in [`back_of`].
+/// True if a triangle has the orientation `back`, as in [`back_of`].
 #[inline(always)]
 pub(in crate::render) fn is_back([a, b, c]: &[Point; 3], back: f64) -> bool {
     ((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)) * back > 0.0
@@ -203,7 +203,7 @@ impl Samples {
         }
     }
 
-    /// Whether a sample is covered.
+    /// True if a sample is covered.
     #[inline(always)]
     pub fn has(&self, row: usize, column: usize) -> bool {
         let word = self.words.get(row * self.width + column / COLUMNS);

@@ -63,7 +63,7 @@ impl Frame {
         Frame { width, height, depth, part: Vec::new(), normal: Vec::new() }
     }
 
-    /// Whether each pixel shows the object, row by row.
+    /// For each pixel, row by row, true if it shows the object.
     pub fn mask(&self) -> impl Iterator<Item = bool> + '_ {
         self.depth.iter().map(|d| d.is_finite())
     }

@@ -117,7 +117,7 @@ impl PixelBitmap {
         if count < 64 { word & ((1 << count) - 1) } else { word }
     }
 
-    /// Whether a rectangle, which may be empty, may contain a set pixel: false only if
+    /// True if a rectangle, which may be empty, may contain a set pixel: false only if
     /// the square with the same upper left corner that covers it contains none.
     #[inline(always)]
     pub fn may_hold(&self, [[left, right], [top, bottom]]: [[usize; 2]; 2]) -> bool {
@@ -126,7 +126,7 @@ impl PixelBitmap {
         (usize::from(reach) <= side) | (side > SIDE)
     }
 
-    /// Whether a rectangle that is not empty contains a set pixel.
+    /// True if a rectangle that is not empty contains a set pixel.
     #[inline(always)]
     pub fn intersects(&self, [[left, right], [top, bottom]]: [[usize; 2]; 2]) -> bool {
         let (columns, rows) = (right - left, bottom - top);

@@ -66,7 +66,7 @@ impl Extent {
         Extent::between(a.min(b).min(c), size)
     }
 
-    /// Whether it contains no pixels.
+    /// True if it contains no pixels.
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.0.cmplt(self.0.zwxy()).bitmask() & 0b11 != 0b11
@@ -86,7 +86,7 @@ pub(in crate::render) fn size(width: u32, height: u32) -> Vec4 {
     Vec4::new(width, height, width, height)
 }
 
-/// Whether a position, or the least coordinates of several, are within the bounds, so
+/// True if a position, or the least coordinates of several, are within the bounds, so
 /// that nothing was clamped.
 #[inline(always)]
 pub(in crate::render) fn is_near(least: Place) -> bool {
@@ -100,7 +100,7 @@ pub(in crate::render) struct Point {
     pub x: f64,
     /// Pixels from the top edge.
     pub y: f64,
-    /// What grows towards the camera and is linear in the picture; see `project`.
+    /// A number that grows towards the camera and is linear in the picture; see `project`.
     pub nearness: f64,
 }
 

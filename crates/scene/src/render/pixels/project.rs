@@ -91,7 +91,7 @@ pub(in crate::render) struct Placement {
     /// Cofactors of `m` times the sign of its determinant: maps outward normals to
     /// outward normals.
     cofactor: DMat3,
-    /// Whether the instance is mirrored, which reverses the winding of its faces.
+    /// True if the instance is mirrored, which reverses the winding of its faces.
     pub mirrored: bool,
     /// `facing = n . (view - bend * p)` in the mesh's coordinates.
     view: DVec3,
@@ -187,7 +187,7 @@ pub(in crate::render) struct Vertices<'a> {
     y: &'a [f32],
     nearness: &'a [f32],
     places: &'a [Place],
-    /// Whether every vertex is usable and beyond the near plane.
+    /// True if every vertex is usable and beyond the near plane.
     pub whole: bool,
 }
 
@@ -301,7 +301,7 @@ struct Extents {
     /// Least and greatest depth.
     near: f64,
     far: f64,
-    /// Whether all are usable and beyond the near plane.
+    /// True if all are usable and beyond the near plane.
     whole: bool,
 }
 
@@ -369,7 +369,7 @@ impl Vertices<'_> {
         Area { left, right, top, bottom }
     }
 
-    /// Whether the whole mesh is behind the camera, or beside the picture by at least
+    /// True if the whole mesh is behind the camera, or beside the picture by at least
     /// half a pixel, so that it covers no pixel and has no contours there.
     pub fn outside(&self, camera: &Camera) -> bool {
         if !self.whole {

@@ -17,7 +17,7 @@ use crate::render::simd::vectorised;
 use glam::DVec3;
 
 /// Where a triangle comes from.
-pub(in crate::render) struct Source {
+pub(in crate::render) struct FaceId {
     /// Index of the instance in the solid.
     pub instance: usize,
     /// Face of the instance's mesh.
@@ -34,7 +34,7 @@ pub(in crate::render) fn each_triangle(
     solid: &Solid,
     camera: &Camera,
     projected: &Projected,
-    mut draw: impl FnMut(&Triangle, &Source),
+    mut draw: impl FnMut(&Triangle, &FaceId),
 ) {
     for (instance, item) in solid.instances().iter().enumerate() {
         let placement = &Placement::new(camera, &item.affine);
@@ -44,7 +44,7 @@ pub(in crate::render) fn each_triangle(
             camera,
             &projected.mesh(instance),
             |triangle, face| {
-                draw(triangle, &Source { instance, face });
+                draw(triangle, &FaceId { instance, face });
             },
         );
     }

@@ -119,7 +119,7 @@ pub(in crate::render) fn put_face(faces: &mut [u32], at: usize, face: u32, neare
     }
 }
 
-/// Whether a triangle has no area.
+/// True if a triangle has no area.
 #[inline(always)]
 fn is_flat(points: &[Point; 3]) -> bool {
     let area = area(points);

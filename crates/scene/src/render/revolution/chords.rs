@@ -19,7 +19,7 @@ pub(super) struct Chords {
     pub length: Row,
     /// Unit tangent, with the object on its right.
     pub tangent: [Row; 2],
-    /// Whether it may be visible.
+    /// True if it may be visible.
     pub there: Mask,
     /// How much nearer than the chord its own surface reaches, on the outward and on the
     /// other side, in scene units.
@@ -56,7 +56,7 @@ impl Chords {
         }
     }
 
-    /// Whether the chords of silhouettes have the object on the right of their tangents (1)
+    /// True if the chords of silhouettes have the object on the right of their tangents (1)
     /// or on the left (-1).
     #[inline(always)]
     pub fn way(&self, sight: &Sight, samples: &Samples, first: usize, side: usize) -> Row {

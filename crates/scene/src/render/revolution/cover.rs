@@ -178,7 +178,7 @@ impl Lists<'_> {
     }
 }
 
-/// What contains the picture of a span: the convex hull of two circles, without the disc
+/// The region that contains the picture of a span: the convex hull of two circles, without the disc
 /// of a third.
 struct Outline<'a> {
     hull: [&'a Hoop; 2],

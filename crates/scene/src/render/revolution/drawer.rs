@@ -23,9 +23,9 @@ pub(super) struct Drawer<'a> {
     pub sight: &'a Sight,
     pub samples: &'a Samples,
     pub spans: &'a Spans,
-    /// Whether there are visible boundaries, so that the inside may be visible.
+    /// True if there are visible boundaries, so that the inside may be visible.
     pub open: bool,
-    /// Whether all of the surface is beyond the near plane.
+    /// True if all of the surface is beyond the near plane.
     pub whole: bool,
     /// The depth range of the surface.
     pub extent: f64,

@@ -88,7 +88,7 @@ fn nothing_shows_of_what_is_flat_or_behind() {
     }
 }
 
-/// What the normal at a pixel may be, from the nearest spans of its part.
+/// The possible normals at a pixel, from the nearest spans of its part.
 fn normals(
     surface: &Revolution,
     affine: &Affine,

@@ -16,7 +16,7 @@ pub(super) fn mask(on: bool) -> u64 {
     if on { u64::MAX } else { 0 }
 }
 
-/// Whether any condition holds.
+/// True if any condition holds.
 #[inline(always)]
 pub(super) fn any(mask: &Mask) -> bool {
     let mut all = 0;

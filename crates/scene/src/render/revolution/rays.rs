@@ -30,7 +30,7 @@ pub(super) struct Level {
     span: u64,
 }
 
-/// What a span is.
+/// The shape of a span.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Shape {
     Cone(Cone),
@@ -88,7 +88,7 @@ impl Spans {
         self.downwards.sort_unstable_by(|a, b| by(1)(b, a));
     }
 
-    /// Whether each line of sight meets a span between two depths.
+    /// True if each line of sight meets a span between two depths.
     #[inline(always)]
     pub fn meets(&self, rays: &Rays, [from, to]: [&Row; 2]) -> Mask {
         let Rays { square: [c, b, a], height: [at, climb] } = rays;
@@ -163,13 +163,13 @@ impl Spans {
         Inside { near, far, per, low, high }
     }
 
-    /// What each line of sight meets first beyond the near plane.
+    /// The first hit of each line of sight beyond the near plane.
     #[inline(always)]
-    pub fn nearest(&self, rays: &Rays) -> Seen {
+    pub fn nearest(&self, rays: &Rays) -> FirstHits {
         let Rays { height: [at, climb], .. } = rays;
         let Inside { near, far, per, low, high } =
             self.inside(rays, [&[Camera::NEAR; LANES], &[f64::INFINITY; LANES]]);
-        let mut seen = Seen::NOTHING;
+        let mut seen = FirstHits::NOTHING;
         for level in self.levels.iter().filter(|level| level.y >= low && level.y <= high) {
             level.first(rays, &mut seen);
         }
@@ -200,17 +200,18 @@ impl Spans {
     }
 }
 
-/// What lines of sight meet first.
+/// The first hits of lines of sight.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
+pub(super) struct FirstHits {
     /// Infinite where there is nothing.
     pub depth: Row,
     /// The number of the span; that of no span where there is nothing.
     pub span: [u64; LANES],
 }
 
-impl Seen {
-    pub const NOTHING: Seen = Seen { depth: [f64::INFINITY; LANES], span: [u64::MAX; LANES] };
+impl FirstHits {
+    pub const NOTHING: FirstHits =
+        FirstHits { depth: [f64::INFINITY; LANES], span: [u64::MAX; LANES] };
 
     /// Notes a span where it is beyond the near plane and nearer than what was seen.
     #[inline(always)]
@@ -224,7 +225,7 @@ impl Seen {
 impl Level {
     /// Notes where lines of sight meet it before what they have met.
     #[inline(always)]
-    pub fn first(&self, rays: &Rays, seen: &mut Seen) {
+    pub fn first(&self, rays: &Rays, seen: &mut FirstHits) {
         let Rays { square: [c, b, a], height: [at, climb] } = rays;
         for i in 0..LANES {
             let d = (self.y - at[i]) * (1.0 / climb[i]);
@@ -236,7 +237,7 @@ impl Level {
 }
 
 impl Cone {
-    /// Whether a part of it lies between two heights.
+    /// True if a part of it lies between two heights.
     #[inline(always)]
     fn between(&self, low: f64, high: f64) -> bool {
         let [least, most] = self.ends;
@@ -245,7 +246,7 @@ impl Cone {
 
     /// Notes where lines of sight meet it before what they have met.
     #[inline(always)]
-    pub fn first(&self, rays: &Rays, seen: &mut Seen) {
+    pub fn first(&self, rays: &Rays, seen: &mut FirstHits) {
         let Rays { square: [c, b, a], height: [at, climb] } = rays;
         let (middle, half) =
             (0.5 * (self.ends[0] + self.ends[1]), 0.5 * (self.ends[1] - self.ends[0]).abs());

@@ -2,7 +2,7 @@
 
 use super::cover::Patch;
 use super::lanes::{LANES, Row, mask};
-use super::rays::{Seen, Shape};
+use super::rays::{FirstHits, Shape};
 use super::sight::{Lines, Rays, Sight};
 
 /// The number of pixels of a part; a power of 2. It is fixed, so that indices are known to
@@ -69,7 +69,7 @@ impl Scan {
             put(&mut self.square[1], at, &rays.square[1]);
             put(&mut self.square[2], at, &rays.square[2]);
             put(&mut self.height[1], at, &rays.height[1]);
-            self.note(at, &Seen::NOTHING);
+            self.note(at, &FirstHits::NOTHING);
             at += LANES;
         }
     }
@@ -106,7 +106,7 @@ impl Scan {
         &mut self,
         beyond: f64,
         columns: [[usize; 2]; 2],
-        first: impl Fn(&Rays, &mut Seen),
+        first: impl Fn(&Rays, &mut FirstHits),
     ) {
         let [begin, end] = self.window;
         for [from, past] in columns {
@@ -145,15 +145,15 @@ impl Scan {
         Rays { square: [c, get(b, at), get(a, at)], height: [height, get(climb, at)] }
     }
 
-    /// What is met first at pixels from one on, counted from the first.
+    /// The first hits at pixels from one on, counted from the first.
     #[inline(always)]
-    pub fn seen(&self, at: usize) -> Seen {
-        Seen { depth: get(&self.depth, at), span: get(&self.span, at) }
+    pub fn seen(&self, at: usize) -> FirstHits {
+        FirstHits { depth: get(&self.depth, at), span: get(&self.span, at) }
     }
 
     /// Replaces what is met first at pixels from one on, counted from the first.
     #[inline(always)]
-    pub fn note(&mut self, at: usize, seen: &Seen) {
+    pub fn note(&mut self, at: usize, seen: &FirstHits) {
         put(&mut self.depth, at, &seen.depth);
         put(&mut self.span, at, &seen.span);
     }
@@ -169,7 +169,7 @@ pub(super) fn centres(column: usize, row: usize) -> [Row; 2] {
     [x, [row as f64 + 0.5; LANES]]
 }
 
-/// Whether any of some depths is greater than another.
+/// True if any of some depths is greater than another.
 #[inline(always)]
 fn any_beyond(depth: &Row, beyond: f64) -> bool {
     let mut open = 0;

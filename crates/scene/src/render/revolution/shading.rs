@@ -1,7 +1,7 @@
 //! Parts and normals of what lines of sight meet, eight pixels at a time.
 
 use super::lanes::{LANES, Row};
-use super::rays::Seen;
+use super::rays::FirstHits;
 use super::sight::{Lines, Sight};
 use crate::geom::{Revolution, Ring};
 use glam::DVec3;
@@ -81,7 +81,7 @@ impl Shading {
         &self,
         sight: &Sight,
         Lines { origin: [ox, oy, oz], way: [u, v, w] }: &Lines,
-        seen: &Seen,
+        seen: &FirstHits,
         there: u32,
         shown: &mut Shown,
     ) {

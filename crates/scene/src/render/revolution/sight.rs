@@ -152,7 +152,7 @@ impl Sight {
         lines
     }
 
-    /// What all lines of sight share: the origin from a pinhole, or else the way.
+    /// The part that all lines of sight share: the origin from a pinhole, or else the way.
     #[inline(always)]
     pub fn shared<const PINHOLE: bool>(&self) -> [Row; 3] {
         let [x, y, z] = match PINHOLE {

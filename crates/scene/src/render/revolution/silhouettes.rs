@@ -255,7 +255,7 @@ impl Samples {
 /// in pixels, as in a mesh.
 const SPECK: f64 = 0.1;
 
-/// Whether a circle is too small to be seen.
+/// True if a circle is too small to be seen.
 pub(super) fn is_speck(ring: &Ring, sight: &Sight, whole: bool) -> bool {
     // A circle that shows with radius r is at least 2 r wide and high together.
     whole && 2.0 * sight.radius(ring) < SPECK
