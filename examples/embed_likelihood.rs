@@ -4,7 +4,7 @@
 //! For a comparator, which scores a rendered view, see the example of
 //! `pcadlang::host::Seen`.
 
-use pcadlang::host::{Adjoint, Entry, Host, Likelihood, Type};
+use pcadlang::host::{Adjoint, Domain, Entry, Fault, Host, Likelihood, Type};
 use pcadlang::{Error, Program, RunOptions, Value};
 
 /// Huber's loss of numbers about their means: quadratic for small deviations and linear
@@ -17,14 +17,14 @@ struct Huber {
 
 impl Huber {
     /// Returns the deviation of each observed number, in units of the scale.
-    fn off(&self, observed: &Value) -> Result<Vec<f64>, String> {
+    fn off(&self, observed: &Value) -> Result<Vec<f64>, Fault> {
         let xs = observed.numbers();
         if xs.len() != self.mean.len() {
-            return Err(format!(
+            return Err(Fault::type_error(format!(
                 "huber: {} numbers are observed, and there are {} means",
                 xs.len(),
                 self.mean.len()
-            ));
+            )));
         }
         Ok(xs.iter().zip(&self.mean).map(|(x, m)| (x - m) / self.scale).collect())
     }
@@ -35,7 +35,7 @@ impl Likelihood for Huber {
         "huber"
     }
 
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+    fn log_density(&self, observed: &Value) -> Result<f64, Fault> {
         let loss = |z: f64| if z.abs() < 1.0 { 0.5 * z * z } else { z.abs() - 0.5 };
         Ok(-self.off(observed)?.into_iter().map(loss).sum::<f64>())
     }
@@ -58,10 +58,11 @@ impl Likelihood for Huber {
 /// Returns the host with this likelihood.
 pub fn host() -> Host {
     let huber = Entry::likelihood("huber", |a| {
-        Ok(Huber { mean: a.array(0)?.to_vec(), scale: a.positive_or(1, 1.0)? })
+        Ok(Huber { mean: a.array(0)?.to_vec(), scale: a.num("scale")? })
     })
     .argument("mean", Type::Array, "What is expected.")
     .optional("scale", Type::Num, 1.0, "From how far off on the loss is linear.")
+    .within(Domain::Positive)
     .about("Huber's loss as a log likelihood: no density over the data.");
     Host::new().with(huber)
 }

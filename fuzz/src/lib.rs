@@ -180,8 +180,7 @@ pub fn array(bytes: &[u8]) {
     }
 }
 
-/// Tests a camera: the vectors of a camera that was read are finite, and it can be
-/// written and read back.
+/// Tests a camera: the vectors of a camera that was read are finite.
 pub fn camera(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     match Camera::from_json(text) {
@@ -189,8 +188,6 @@ pub fn camera(bytes: &[u8]) {
             for v in [camera.eye, camera.right, camera.up, camera.forward] {
                 assert!(v.is_finite(), "{camera:?}");
             }
-            let again = Camera::from_json(&camera.to_json());
-            assert!(again.is_ok_and(|a| (a.width, a.height) == (camera.width, camera.height)));
         }
         Err(e) => assert!(!e.to_string().is_empty()),
     }

@@ -327,10 +327,10 @@ impl PythonLikelihood {
         first.into_iter().map(Ok).chain(all).collect()
     }
 
-    fn said(code: &Code, e: PyErr) -> String {
+    fn said(code: &Code, e: PyErr) -> Fault {
         let text = format!("{}: {e}", code.name);
         code.failure.keep(e);
-        text
+        Fault::type_error(text)
     }
 }
 
@@ -339,7 +339,7 @@ impl Likelihood for PythonLikelihood {
         &self.log_density.name
     }
 
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+    fn log_density(&self, observed: &Value) -> Result<f64, Fault> {
         let code = &self.log_density;
         let density = code
             .run(|py| self.with(py, vec![to_python(py, observed)?]), |out| out.extract::<f64>());
@@ -357,7 +357,7 @@ impl Likelihood for PythonLikelihood {
         code.kept(done).map(Adjoint::List)
     }
 
-    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
+    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, Fault>> {
         let code = self.sample.as_ref()?;
         let drawn = code.run(
             |py| self.with(py, vec![to_python(py, observed)?, generator(py, rng)?]),

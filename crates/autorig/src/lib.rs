@@ -32,8 +32,8 @@ pub fn host() -> Host {
 fn autorig(a: &Args) -> Result<Value, Fault> {
     let solid = a.object::<SolidValue>(0, "a solid")?;
     let mesh = solid.0.to_mesh().map_err(fault)?;
-    let most = if a.given(2) { a.int_in(2, 1, MOST_BONES as i64)? as usize } else { 16 };
-    let made = match a.choice(1, &["groups", "skeleton"])? {
+    let most = a.int("bones")? as usize;
+    let made = match a.word("from")? {
         "skeleton" => by_skeleton(&mesh, most).map_err(fault),
         _ => by_groups(&mesh).map_err(|e| {
             let one = mesh.topology.parts.windows(2).all(|p| p[0] == p[1]);

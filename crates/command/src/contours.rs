@@ -3,21 +3,20 @@
 use super::args::Contours;
 use pcadlang_library::scene::DetectorValue;
 use pcadlang_report::pictures::png;
-use pcadlang_runs::edges;
 use pcadlang_runs::failure::{Failure, plain};
-use pcadlang_runs::files;
+use pcadlang_runs::{files, inputs};
 use pcadlang_scene::vision::{GradientDetector, MAP_SIZE, MOST_MAP_SIZE};
 
 /// Detects the contours of a photograph and writes them as a map.
 pub fn contours(a: &Contours) -> Result<(), Failure> {
-    let photo = files::photo(&a.image)?;
+    let photo = inputs::photo(&a.image)?;
     let map = match &a.edges {
         None => {
             let by = GradientDetector::default();
             GradientDetector { size: a.size.unwrap_or(by.size), ..by }.contours(&photo)
         }
         Some(spec) => {
-            let DetectorValue(detector) = edges::detector(spec)?;
+            let DetectorValue(detector) = inputs::detector(spec)?;
             let detector = detector.ok_or_else(|| plain(format!("{spec} is not a detector")))?;
             let size = a.size.unwrap_or(MAP_SIZE);
             if size > MOST_MAP_SIZE {

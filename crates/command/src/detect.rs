@@ -5,7 +5,7 @@ use image::RgbImage;
 use pcadlang_detectors::people::{FindOptions, Person, json};
 use pcadlang_report::pictures::{DETECTED, dots, limbs, picture_size, png};
 use pcadlang_runs::failure::{Failure, plain};
-use pcadlang_runs::files;
+use pcadlang_runs::{files, inputs};
 use pcadlang_scene::vision::Photo;
 use std::path::PathBuf;
 
@@ -82,9 +82,9 @@ const BONES: [(&[Bone], [f32; 3]); 3] = [
 
 /// Detects the people in a photograph and writes their positions.
 pub fn detect(a: &Detect) -> Result<(), Failure> {
-    let photo = files::photo(&a.image)?;
+    let photo = inputs::photo(&a.image)?;
     let options = FindOptions { views: a.views, most: a.people as usize, ..FindOptions::default() };
-    let people = pcadlang_runs::networks::finder(a.models.as_deref())?
+    let people = inputs::finder(a.models.as_deref())?
         .find(&photo, &options, a.threads)
         .map_err(|e| plain(e.to_string()))?;
     let size = (photo.width(), photo.height());

@@ -17,7 +17,7 @@ pub use options::{NetworkOptions, Output};
 
 use pcadlang_engine::lang::builtins::data::unreadable;
 use pcadlang_engine::lang::value::Value;
-use pcadlang_inference::host::{Beside, DataFormat, DataOptions, Fault, Host, Literal};
+use pcadlang_inference::host::{DataFormat, DataOptions, Fault, Host, Literal, ReadRelative};
 use pcadlang_library::scene::{self, DetectorValue, Row};
 use std::sync::Arc;
 
@@ -36,7 +36,7 @@ impl DataFormat for DetectorFile {
         file: &str,
         bytes: &[u8],
         options: &DataOptions,
-        _: &Beside,
+        _: &ReadRelative,
     ) -> Result<Value, Fault> {
         let network = options::network(options).map_err(|why| unreadable(file, &why))?;
         read(bytes, &network)

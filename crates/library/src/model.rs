@@ -1,6 +1,5 @@
 //! Embedding: a program compiled with its data, run to a posterior, in a few calls.
 
-mod camera;
 mod edited;
 mod hosted;
 mod program;

@@ -11,7 +11,8 @@ use crate::scene;
 use image::GrayImage;
 use pcadlang_engine::lang::value::Located;
 use pcadlang_engine::trace::Trace;
-use pcadlang_inference::{BestSoFar, BestState, ChainResult};
+use pcadlang_inference::draws::SiteStats;
+use pcadlang_inference::{BestSoFar, BestState, ChainResult, stuck_structure, stuck_together};
 use pcadlang_library::Model;
 use pcadlang_library::scene::{ImageValue, ViewValue};
 use pcadlang_report::RunDir;
@@ -26,7 +27,7 @@ use std::time::{Duration, Instant};
 /// The time until the best state is written first.
 const FIRST: Duration = Duration::from_millis(200);
 
-/// What is known of the best state once it has been rendered.
+/// The best state as it was rendered.
 #[derive(Default)]
 pub struct Shown {
     /// Its view.
@@ -217,4 +218,30 @@ fn export(
             Ok(())
         }
     }
+}
+
+/// Warns of choices that determine which others exist, and hardly ever move.
+pub fn structure_warning(state: &Trace, sites: &[SiteStats]) -> Option<String> {
+    let stuck = stuck_structure(state, sites);
+    let (address, rate) = stuck.first()?;
+    let more =
+        if stuck.len() > 1 { format!(" (and {} others)", stuck.len() - 1) } else { String::new() };
+    Some(format!(
+        "{address}{more} decides which other choices exist, and {:.1}% of its proposals were accepted, so \
+         the number of components hardly changes; marginalise their labels, as in `observe mixture(map(fn(m) {{ 1 / k }}, mu), \
+         map(fn(m) {{ normal(m, sd) }}, mu)) = ys;` (guide, chapter 7)",
+        100.0 * rate
+    ))
+}
+
+/// Warns of choices that never moved in any chain and may hold each other in place.
+pub fn stuck_warning(state: &Trace, sites: &[SiteStats]) -> Option<String> {
+    let stuck = stuck_together(state, sites);
+    let others = stuck.len().checked_sub(1)?;
+    Some(format!(
+        "{} and {others} others that it depends on never moved in any chain, although other values \
+         are possible: the chains may not be able to leave the modes in which they began; draw \
+         such choices together, with exact($finite) or block(…)",
+        stuck.first()?
+    ))
 }

@@ -4,7 +4,7 @@
 use crate::best::Shown;
 use crate::failure::Failure;
 use crate::files::write_in;
-use crate::ready::Ready;
+use crate::inputs::Ready;
 use crate::scene;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use image::RgbImage;

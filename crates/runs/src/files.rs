@@ -5,7 +5,6 @@ use pcadlang_engine::lang::load::reason;
 use pcadlang_engine::lang::reach::read_file;
 use pcadlang_library::shipped;
 use pcadlang_report::RunDir;
-use pcadlang_scene::vision::{Limits, Photo, photo};
 use std::path::Path;
 
 /// Reads a file.
@@ -22,12 +21,6 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 /// Writes a file of a run.
 pub fn write_in(dir: &RunDir, name: &str, bytes: &[u8]) -> Result<(), Failure> {
     dir.write(name, bytes).map_err(|e| plain(format!("{e}; earlier output is kept")))
-}
-
-/// Reads a photograph.
-pub fn photo(path: &Path) -> Result<Photo, Failure> {
-    let bytes = read(path)?;
-    photo::decode(&bytes, &Limits::default()).map_err(|e| plain(format!("{}: {e}", path.display())))
 }
 
 /// Resolves the name of a program on the command line: `lathe` means `lathe.pcad`, unless

@@ -1,17 +1,69 @@
-//! Makes a program with its data from the command line.
+//! Everything that a run reads: its program, and the data, photographs, keypoints, detectors and
+//! networks of its command line.
 
 use crate::args::{Inputs, Job};
 use crate::failure::{Failure, plain};
 use crate::files;
+use pcadlang_detectors::people::{PeopleFinder, networks};
 use pcadlang_engine::lang::builtins::data::Options;
 use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::Limits as Bounds;
-use pcadlang_library::Program;
-use pcadlang_library::scene::{self, ImageValue};
-use pcadlang_library::standard;
+use pcadlang_library::scene::{self, DetectorValue, ImageValue};
+use pcadlang_library::{Model, Program, standard};
 use pcadlang_scene::render::Camera;
-use pcadlang_scene::vision::ContourMap;
+use pcadlang_scene::vision::{self, ContourMap, Photo};
+use pcadlang_syntax::ast::{ExprKind, ItemKind};
+use pcadlang_syntax::parse;
+use pcadlang_syntax::span::FileId;
+use std::borrow::Cow;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+/// A compiled program with its observed data.
+pub struct Ready {
+    /// The program with its data.
+    pub model: Model,
+    /// The name and value of the photograph.
+    pub named_image: Option<(String, Value)>,
+    /// The program has a param `person`, which selects a person in the
+    /// photograph.
+    pub chooses: bool,
+    /// When the run's time began.
+    pub begun: Instant,
+}
+
+impl Ready {
+    /// Returns the width and height of the photograph, if there is one.
+    pub fn size(&self) -> Option<(u32, u32)> {
+        self.photo().map(|p| (p.width(), p.height()))
+    }
+
+    /// Returns the photograph, if there is one.
+    pub fn photo(&self) -> Option<&Photo> {
+        self.image()?.as_photo()
+    }
+
+    /// Returns the photograph with its detections, or a contour map without a photograph,
+    /// if there is one.
+    pub fn image(&self) -> Option<&ImageValue> {
+        self.named_image.as_ref()?.1.downcast::<ImageValue>()
+    }
+}
+
+/// Reads and compiles a program; the time of a run begins here.
+pub fn prepare(job: &Job, quiet: bool) -> Result<Ready, Failure> {
+    let begun = Instant::now();
+    prepare_program(self::program(&job.inputs, quiet)?, job, begun)
+}
+
+/// Compiles a program that was read for a job; the time of a run began at `begun`.
+pub fn prepare_program(program: Program, job: &Job, begun: Instant) -> Result<Ready, Failure> {
+    let (program, image) = observe(program, job)?;
+    let chooses = program.interface().params.iter().any(|p| p.name == "person");
+    Ok(Ready { model: program.compile()?, named_image: image, chooses, begun })
+}
 
 /// The name of a program that comes from the standard input.
 pub const STDIN: &str = "-";
@@ -40,7 +92,9 @@ pub fn program(inputs: &Inputs, quiet: bool) -> Result<Program, Failure> {
     let limits =
         inputs.allowed.limits.iter().try_fold(Bounds::default(), |l, (name, n)| l.with(name, *n));
     program = program.limits(limits.map_err(plain)?);
-    crate::networks::choose(inputs.who.models.as_deref())?;
+    if let Some(folder) = &inputs.who.models {
+        networks::choose(finder(Some(folder))?);
+    }
     if let Some(n) = inputs.who.person {
         program = program.set("person", &n.to_string());
     }
@@ -51,16 +105,21 @@ pub fn program(inputs: &Inputs, quiet: bool) -> Result<Program, Failure> {
         program = program.set(name, value);
     }
     if let Some(spec) = &inputs.edges {
-        program = program.detector(crate::edges::detector(spec)?);
+        program = program.detector(detector(spec)?);
     }
     if let Some(path) = &inputs.camera {
-        let text = String::from_utf8(files::read(path)?)
-            .map_err(|_| plain(format!("{}: not text", path.display())))?;
-        let camera =
-            Camera::from_json(&text).map_err(|e| plain(format!("{}: {e}", path.display())))?;
-        program = program.camera(camera);
+        let wrong = |why: &dyn Display| plain(format!("{}: {why}", path.display()));
+        let text = String::from_utf8(files::read(path)?).map_err(|_| wrong(&"not text"))?;
+        program = program.camera(Camera::from_json(&text).map_err(|e| wrong(&e))?);
     }
     Ok(program)
+}
+
+/// Reads a photograph.
+pub fn photo(path: &Path) -> Result<Photo, Failure> {
+    let bytes = files::read(path)?;
+    vision::photo::decode(&bytes, &vision::Limits::default())
+        .map_err(|e| plain(format!("{}: {e}", path.display())))
 }
 
 /// Binds the files of `--observe`, `--keypoints` and `--observe-contours`. Returns the
@@ -78,7 +137,7 @@ pub fn observe(
             program.interface().data.iter().find(|d| d.name == name).and_then(|d| d.ty.clone());
         match kind.as_deref() {
             Some("image") => {
-                let photo = Value::object(ImageValue::photo(files::photo(Path::new(&path))?));
+                let photo = Value::object(ImageValue::photo(photo(Path::new(&path))?));
                 program = program.observe(&name, photo.clone());
                 stem = Path::new(&path).file_stem().and_then(|s| s.to_str()).map(str::to_owned);
                 image = Some((name, photo));
@@ -105,7 +164,7 @@ pub fn observe(
         program = program.observe(&name, found.map_err(|f| Failure::Plain(f.message, f.hint))?);
     }
     if let Some(path) = &job.observe_contours {
-        let map = ContourMap::from_photo(&files::photo(path)?);
+        let map = ContourMap::from_photo(&photo(path)?);
         let name = match &image {
             Some((name, _)) => name.clone(),
             None => only(&program, "image", "--observe")?,
@@ -195,4 +254,110 @@ fn only(program: &Program, kind: &str, option: &str) -> Result<String, Failure> 
             Some(format!("name the item: --observe NAME=FILE, one of {}", fit.join(", "))),
         )),
     }
+}
+
+/// The detector that was read last, with its argument, so that a command that runs a
+/// program many times reads it once.
+static LAST: Mutex<Option<(String, DetectorValue)>> = Mutex::new(None);
+
+/// Splits `FILE[, OPTION = VALUE, …]` into the file and the options. If a file with the
+/// whole name exists, it is meant.
+fn detector_parts(spec: &str) -> (&str, &str) {
+    match spec.split_once(',') {
+        Some((file, options)) if !Path::new(spec).exists() => (file.trim(), options.trim()),
+        _ => (spec, ""),
+    }
+}
+
+/// Returns the file of `FILE[, OPTION = VALUE, …]`.
+pub fn detector_file(spec: &str) -> &Path {
+    Path::new(detector_parts(spec).0)
+}
+
+/// Loads the detector of `FILE[, OPTION = VALUE, …]`; the options are those of `detector`
+/// in a program.
+pub fn detector(spec: &str) -> Result<DetectorValue, Failure> {
+    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, known)) = last.as_ref().filter(|(s, _)| s == spec) {
+        return Ok(known.clone());
+    }
+    let (file, text) = detector_parts(spec);
+    let options = detector_options(text)?;
+    let bytes = files::read(Path::new(file))?;
+    let alone = |other: &str| {
+        Err(format!("{file} refers to {other}, but a detector must be a single file"))
+    };
+    let loaded = standard::table().load("detector", file, &bytes, &options, &alone);
+    let loaded = loaded.map_err(|f| Failure::Plain(f.message, f.hint))?;
+    let detector = loaded.downcast::<DetectorValue>().cloned().unwrap_or_default();
+    *last = Some((spec.to_owned(), detector.clone()));
+    Ok(detector)
+}
+
+/// Parses options such as `colours = "bgr", white = 255` as the arguments of a call.
+fn detector_options(text: &str) -> Result<Options, Failure> {
+    if text.is_empty() {
+        return Ok(Options::default());
+    }
+    let wrong = |why: &str, hint: Option<String>| {
+        let hint = hint.or_else(|| {
+            Some("for example --edges 'network.onnx, colours = \"bgr\", white = 255'".into())
+        });
+        Failure::Plain(format!("--edges: {why} (`{text}`)"), hint)
+    };
+    let (program, errors) = parse(&format!("data d = detector({text});"), FileId(0));
+    let args = match program.items.first().map(|i| &i.kind) {
+        Some(ItemKind::Data(d)) if errors.is_empty() && program.items.len() == 1 => {
+            match d.default.as_ref().map(|e| &e.kind) {
+                Some(ExprKind::Call { args, .. }) => Some(args),
+                _ => None,
+            }
+        }
+        _ => None,
+    };
+    let args =
+        args.ok_or_else(|| wrong("expected the options of a detector after the file name", None))?;
+    standard::table().options("detector", args).map_err(|(_, f)| wrong(&f.message, f.hint))
+}
+
+/// Returns what contours depend on besides the picture: the bytes of the file, and the
+/// options.
+pub fn detector_bytes(spec: Option<&str>) -> Result<Vec<u8>, Failure> {
+    let Some(spec) = spec else { return Ok(Vec::new()) };
+    let mut all = files::read(detector_file(spec))?;
+    all.extend(detector_parts(spec).1.as_bytes());
+    Ok(all)
+}
+
+/// Landmark networks in a folder, the best first.
+const LANDMARKS: [&str; 3] =
+    ["pose_landmark_heavy.tflite", "pose_landmark_full.tflite", "pose_landmark_lite.tflite"];
+const DETECTION: &str = "pose_detection.tflite";
+
+/// Loads the networks of a folder, or else the built-in ones.
+pub fn finder(folder: Option<&Path>) -> Result<PeopleFinder, Failure> {
+    let (detection, landmarks, from) = match folder {
+        None => {
+            let (detection, landmarks) = networks::files();
+            (Cow::Borrowed(detection), Cow::Borrowed(landmarks), "the program's own".to_owned())
+        }
+        Some(folder) => {
+            let best =
+                LANDMARKS.iter().map(|n| folder.join(n)).find(|p| p.exists()).ok_or_else(|| {
+                    plain(format!(
+                        "{}: none of {} was found",
+                        folder.display(),
+                        LANDMARKS.join(", ")
+                    ))
+                })?;
+            // The detection network is the same for all landmark networks.
+            let path = folder.join(DETECTION);
+            let detection = match path.exists() {
+                true => Cow::Owned(files::read(&path)?),
+                false => Cow::Borrowed(networks::files().0),
+            };
+            (detection, Cow::Owned(files::read(&best)?), folder.display().to_string())
+        }
+    };
+    PeopleFinder::new(&detection, &landmarks).map_err(|e| plain(format!("{from}: {e}")))
 }

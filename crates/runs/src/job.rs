@@ -5,26 +5,26 @@
 //! complete.
 
 use crate::args::{Job, Live};
-use crate::best::{disagreement, keep_best, outside, show_best};
+use crate::best::{disagreement, keep_best, outside, show_best, structure_warning, stuck_warning};
 use crate::embedded::write_scene;
 use crate::failure::{Failure, plain};
 use crate::files::write_in;
+use crate::inputs::Ready;
 use crate::keypoints::{Joints, coco};
+use crate::people;
 use crate::places::{best_of_each, show_places};
+pub use crate::progress::Interrupt;
 use crate::progress::{self, Ending};
-use crate::ready::Ready;
 use crate::reopening::page::write_page;
 use crate::reopening::reopened::{PROGRAM, TRACES, TRAJECTORY, arguments};
 use crate::reopening::{date, seen};
 use crate::stream::Streamed;
 use crate::watched::Watched;
-use crate::{edges, people};
 use crate::{files, inputs};
 use pcadlang_inference::RunOptions;
 use pcadlang_inference::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang_inference::{
-    BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Progress, Trajectory,
-    stuck_structure, stuck_together,
+    BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Trajectory,
 };
 use pcadlang_library::{Model, Started};
 use pcadlang_report::{
@@ -35,8 +35,8 @@ use pcadlang_workbench::bank::BankFiles;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// The results of a run.
@@ -60,19 +60,15 @@ pub struct Outcome {
     pub every: u64,
     /// Wall time until everything except the page was written.
     pub seconds: f64,
-    /// Whether the user interrupted the run.
+    /// The user interrupted the run.
     pub interrupted: bool,
 }
 
 impl Outcome {
     /// Returns the time of all kernels after warm-up, over all chains, in seconds.
     pub fn kernel_seconds(&self) -> f64 {
-        kernel_seconds(&self.kernels)
+        self.kernels.iter().map(|k| k.seconds).sum()
     }
-}
-
-fn kernel_seconds(kernels: &[KernelStats]) -> f64 {
-    kernels.iter().map(|k| k.seconds).sum()
 }
 
 /// Returns the summary of each quantity, with its effective sample size per second of
@@ -87,55 +83,6 @@ pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
         (q.name.clone(), s)
     };
     quantities.iter().map(one).collect()
-}
-
-/// Ctrl-C, which ends all current runs.
-#[derive(Default)]
-pub struct Interrupt {
-    asked: AtomicBool,
-    runs: Mutex<Vec<Weak<Progress>>>,
-}
-
-impl Interrupt {
-    /// Handles Ctrl-C from now on, until the command ends.
-    pub fn listen() -> Arc<Interrupt> {
-        let interrupt = Arc::new(Interrupt::default());
-        let heard = Arc::clone(&interrupt);
-        // If no handler can be set, the system's default stays. A second Ctrl-C exits
-        // without waiting for the end of the step; the files on the disk are complete
-        // then.
-        let _ = ctrlc::set_handler(move || {
-            if heard.asked.swap(true, Ordering::SeqCst) {
-                std::process::exit(130);
-            }
-            heard.pass_on();
-        });
-        interrupt
-    }
-
-    /// Returns whether the user has interrupted the command.
-    pub fn asked(&self) -> bool {
-        self.asked.load(Ordering::SeqCst)
-    }
-
-    /// Makes a run end at its next step after an interrupt, or at once if there was one
-    /// already.
-    pub fn ends(&self, run: &Arc<Progress>) {
-        let mut runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
-        runs.retain(|r| r.strong_count() > 0);
-        runs.push(Arc::downgrade(run));
-        drop(runs);
-        if self.asked() {
-            self.pass_on();
-        }
-    }
-
-    fn pass_on(&self) {
-        let runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
-        for run in runs.iter().filter_map(Weak::upgrade) {
-            run.cancelled.store(true, Ordering::Relaxed);
-        }
-    }
 }
 
 /// Hashes the files named on the command line, and those that the program reads itself.
@@ -154,7 +101,7 @@ pub fn inputs_hash(job: &Job, model: &Model) -> Result<String, Failure> {
         all.push_str(&bytes_hash(&files::read(path)?));
     }
     if job.inputs.edges.is_some() {
-        all.push_str(&bytes_hash(&edges::bytes(job.inputs.edges.as_deref())?));
+        all.push_str(&bytes_hash(&inputs::detector_bytes(job.inputs.edges.as_deref())?));
     }
     Ok(text_hash(&all))
 }
@@ -251,17 +198,17 @@ pub const CHECKPOINT: Duration = Duration::from_secs(10);
 /// How a run is carried out; its draws do not depend on this.
 #[derive(Clone, Debug)]
 pub struct RunMode {
-    /// Whether progress is shown.
+    /// Progress is shown.
     pub live: bool,
     /// The time between checkpoints.
     pub checkpoint: Duration,
-    /// Whether to resume the run in the folder.
+    /// The run in the folder is resumed.
     pub resume: bool,
     /// How many complete states are kept.
     pub keep: u32,
     /// Where the best state is sent as it improves.
     pub follow: Option<Live>,
-    /// Whether draws are printed as they are made.
+    /// Draws are printed as they are made.
     pub stream: bool,
 }
 
@@ -272,10 +219,10 @@ pub fn perform(
     dir: &RunDir,
     record: &Map<String, Value>,
     interrupt: &Interrupt,
-    manner: RunMode,
+    mode: RunMode,
 ) -> Result<Outcome, Failure> {
-    let watched = Watched::new(job, &ready.model, manner.keep);
-    perform_watched(job, ready, dir, record, interrupt, manner, &watched)
+    let watched = Watched::new(job, &ready.model, mode.keep);
+    perform_watched(job, ready, dir, record, interrupt, mode, &watched)
 }
 
 /// [`perform`] with something to look at meanwhile, made for the same job.
@@ -285,12 +232,23 @@ pub fn perform_watched(
     dir: &RunDir,
     record: &Map<String, Value>,
     interrupt: &Interrupt,
-    manner: RunMode,
+    mode: RunMode,
     watched: &Watched,
 ) -> Result<Outcome, Failure> {
     write_record(dir, record, "running", json!({}))?;
     write_in(dir, PROGRAM, ready.model.text().as_bytes())?;
-    fill(job, ready, dir, record, interrupt, manner, watched).inspect_err(|failure| {
+    let chains = job.sampling.chains();
+    let fill = Fill {
+        job,
+        ready,
+        dir,
+        record,
+        watched,
+        joints: Joints::new(chains, ready.size()),
+        // A single chain has one mode, which needs no evidence.
+        evidence: Arc::new(Evidence::new(if chains > 1 { chains } else { 0 })),
+    };
+    fill.all(&mode, interrupt).inspect_err(|failure| {
         // An error in writing the record must not hide the first error.
         let _ = record_failure(dir, record, failure, ready.begun.elapsed().as_secs_f64());
     })
@@ -319,154 +277,172 @@ pub fn options(job: &Job, ready: &Ready, callback: Option<Arc<dyn Callback>>) ->
     }
 }
 
-fn fill(
-    job: &Job,
-    ready: &Ready,
-    dir: &RunDir,
-    record: &Map<String, Value>,
-    interrupt: &Interrupt,
-    manner: RunMode,
-    watched: &Watched,
-) -> Result<Outcome, Failure> {
-    let Ready { model, named_image: image, begun, chooses } = ready;
-    let s = &job.sampling;
-    let joints = Joints::new(s.chains(), ready.size());
-    let Watched { progress, best, kept, trajectory, memories } = watched;
-    // A single chain has one mode, which needs no evidence.
-    let evidence = Arc::new(Evidence::new(if s.chains() > 1 { s.chains() } else { 0 }));
-    let callbacks: Vec<Arc<dyn Callback>> = vec![
-        Arc::new(joints.clone()),
-        best.clone(),
-        evidence.clone(),
-        kept.clone(),
-        trajectory.clone(),
-    ];
-    let options = options(job, ready, Some(Arc::new(Callbacks::from_iter(callbacks))));
-    if manner.resume {
-        let lines = std::fs::read_to_string(dir.file(TRAJECTORY)).unwrap_or_default();
-        let states = lines.lines().filter_map(|line| serde_json::from_str(line).ok());
-        trajectory.restore(states.collect());
-    }
-    let sinks = sinks(dir, job, model, memories, record, &manner)?;
-    let ending = Ending::default();
-    interrupt.ends(progress);
-    let results = std::thread::scope(|scope| {
-        scope.spawn(|| {
-            progress::watch(progress, (s.chains(), "chains"), &ending, options.time, !manner.live)
-        });
-        scope.spawn(|| progress::ask_for_checkpoints(progress, &ending, manner.checkpoint));
-        scope.spawn(|| keep_best(dir, model, best, &ending, manner.checkpoint));
-        scope.spawn(|| keep_states(dir, kept, trajectory, &ending, manner.checkpoint));
-        scope.spawn(|| manner.follow.iter().for_each(|l| l.follow(ready, watched, &ending)));
-        ending.of(|| model.run_into(&options, threads(job), progress, sinks))
-    })?;
-    let interrupted = progress.cancelled.load(Ordering::Relaxed);
-    let sampled = begun.elapsed().as_secs_f64();
+/// A run and where it is written.
+struct Fill<'a> {
+    job: &'a Job,
+    ready: &'a Ready,
+    dir: &'a RunDir,
+    record: &'a Map<String, Value>,
+    watched: &'a Watched,
+    joints: Joints,
+    evidence: Arc<Evidence>,
+}
 
-    let Started { chains, places: ran, mut warnings } = model.started(results)?;
-    write_traces(dir, kept)?;
-    write_lines(dir, TRAJECTORY, &trajectory.all())?;
-    let mut draws: Vec<ChainDraws> = memories.iter().map(Memory::draws).collect();
-    // A run that may be resumed keeps all its draws.
-    let even = align(dir.path(), s.chains(), !interrupted);
-    let even =
-        even.map_err(|e| plain(format!("{}: {e}; its draws are kept", dir.path().display())))?;
-    if let Some(even) = even {
-        draws.iter_mut().for_each(|d| d.rows.retain(|r| r.draw < even));
+impl Fill<'_> {
+    /// Runs the chains, and writes what was found.
+    fn all(&self, mode: &RunMode, interrupt: &Interrupt) -> Result<Outcome, Failure> {
+        let started = self.sample(mode, interrupt)?;
+        let sampled = self.ready.begun.elapsed();
+        let interrupted = self.watched.progress.cancelled.load(Ordering::Relaxed);
+        let draws = self.write_draws(&started, interrupted)?;
+        let (outcome, more) = self.summarise(started, &draws, interrupted)?;
+        self.finish(outcome, more, sampled)
     }
-    widen(&mut draws);
-    let points = chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
-    let mut step_sizes = vec![None; draws.len()];
-    for (c, i) in chains.iter().zip(&ran) {
-        step_sizes[*i] = c.kernels.iter().find_map(|k| k.step_size);
-    }
-    let zarr = zarr::write(dir.path(), &draws, &step_sizes, &points);
-    zarr.map_err(|e| {
-        plain(format!("{}: {e}; earlier output is kept", dir.file(zarr::ZARR).display()))
-    })?;
-    let quantities = quantities(&draws);
-    let every = draws.iter().map(|d| d.every).max().unwrap_or(1);
-    let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
-    let modes = modes(&quantities, Some(&evidence));
-    warnings.extend(pcadlang_report::warnings(&quantities, &modes, &kernels, chains.len()));
-    let person = job.inputs.who.person.unwrap_or(1);
-    if *chooses {
-        warnings
-            .extend(image.iter().flat_map(|(name, image)| people::warnings(name, image, person)));
-    }
-    let approximate = approximate(job, &chains);
-    let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
-    warnings.extend(chains.first().and_then(|c| structure_warning(&c.last, &sites)));
-    warnings.extend(chains.first().and_then(|c| stuck_warning(&c.last, &sites)));
-    let inputs = image.as_ref().map(|(name, _)| name.as_str()).zip(ready.image());
-    let located = chains.first().map_or_else(Vec::new, |c| c.last.located());
-    warnings.extend(seen::warnings(inputs, job.keypoints.as_deref(), &located));
-    let places = best_of_each(&modes, best);
-    let best = best.state();
-    let drawn = show_best(dir, s.seed, model, best.as_deref(), &chains, ready.image())?;
-    show_places(dir, s.seed, model, &places, ready.photo())?;
-    let log_joint = best.as_ref().map_or(f64::NAN, |b| b.log_joint);
-    write_scene(dir, s.seed, ready, (log_joint, &drawn), &kept.all())?;
-    warnings.extend(disagreement(&drawn));
-    warnings.extend(outside(&drawn));
-    let summary = json!({
-        "quantities": summaries(&quantities, kernel_seconds(&kernels)), "kernels": kernels, "choices": sites,
-        "modes": modes, "warnings": warnings, "approximate": approximate, "every": every,
-    });
-    write_in(dir, "summary.json", &serde_json::to_vec_pretty(&summary).unwrap_or_default())?;
-    let elapsed = begun.elapsed().as_secs_f64();
-    if let Some(found) = drawn.view.as_ref().and_then(|v| joints.report(v, &modes, elapsed)) {
-        write_in(dir, "keypoints.json", &serde_json::to_vec_pretty(&found).unwrap_or_default())?;
-        let picture = job.observe.first().map_or("", |o| stem(inputs::file_of(o)));
-        if let Some(coco) = coco(&found, picture) {
-            write_in(dir, "keypoints.coco.json", coco.to_string().as_bytes())?;
+
+    /// Runs the chains; what is on the disk stays complete meanwhile.
+    fn sample(&self, mode: &RunMode, interrupt: &Interrupt) -> Result<Started, Failure> {
+        let Fill { job, ready, dir, record, watched, .. } = self;
+        let Watched { progress, best, kept, trajectory, memories } = watched;
+        let (model, s) = (&ready.model, &job.sampling);
+        let callbacks: Vec<Arc<dyn Callback>> = vec![
+            Arc::new(self.joints.clone()),
+            best.clone(),
+            self.evidence.clone(),
+            kept.clone(),
+            trajectory.clone(),
+        ];
+        let options = options(job, ready, Some(Arc::new(Callbacks::from_iter(callbacks))));
+        if mode.resume {
+            let lines = std::fs::read_to_string(dir.file(TRAJECTORY)).unwrap_or_default();
+            let states = lines.lines().filter_map(|line| serde_json::from_str(line).ok());
+            trajectory.restore(states.collect());
         }
+        let sinks = sinks(dir, job, model, memories, record, mode)?;
+        let ending = Ending::default();
+        interrupt.ends(progress);
+        let chains = (s.chains(), "chains");
+        let results = std::thread::scope(|scope| {
+            scope.spawn(|| progress::watch(progress, chains, &ending, options.time, !mode.live));
+            scope.spawn(|| progress::ask_for_checkpoints(progress, &ending, mode.checkpoint));
+            scope.spawn(|| keep_best(dir, model, best, &ending, mode.checkpoint));
+            scope.spawn(|| keep_states(dir, kept, trajectory, &ending, mode.checkpoint));
+            scope.spawn(|| mode.follow.iter().for_each(|l| l.follow(ready, watched, &ending)));
+            ending.of(|| model.run_into(&options, threads(job), progress, sinks))
+        })?;
+        Ok(model.started(results)?)
     }
-    let mut more = counts(&chains, best.as_deref(), &quantities);
-    more.extend(drawn.agreement.map(|a| ("agreement".into(), json!(a))));
-    more.extend([("sampling_seconds".into(), json!(sampled)), ("seconds".into(), json!(elapsed))]);
-    let run =
-        recorded(record, if interrupted { "interrupted" } else { "done" }, Value::Object(more));
-    write_page(dir, &run, &summary, &quantities)?;
-    write_run(dir, &run)?;
-    Ok(Outcome {
-        quantities,
-        kernels,
-        sites,
-        modes,
-        warnings,
-        approximate,
-        chains,
-        every,
-        seconds: elapsed,
-        interrupted,
-    })
-}
 
-/// Warns of choices that determine which others exist, and hardly ever move.
-fn structure_warning(state: &pcadlang_engine::trace::Trace, sites: &[SiteStats]) -> Option<String> {
-    let stuck = stuck_structure(state, sites);
-    let (address, rate) = stuck.first()?;
-    let more =
-        if stuck.len() > 1 { format!(" (and {} others)", stuck.len() - 1) } else { String::new() };
-    Some(format!(
-        "{address}{more} decides which other choices exist, and {:.1}% of its proposals were accepted, so \
-         the number of components hardly changes; marginalise their labels, as in `observe mixture(map(fn(m) {{ 1 / k }}, mu), \
-         map(fn(m) {{ normal(m, sd) }}, mu)) = ys;` (guide, chapter 7)",
-        100.0 * rate
-    ))
-}
+    /// Writes the states that were kept and the draws as arrays; chains that were not
+    /// interrupted end with the same draw.
+    fn write_draws(&self, ran: &Started, interrupted: bool) -> Result<Vec<ChainDraws>, Failure> {
+        let Fill { dir, watched, .. } = self;
+        write_traces(dir, &watched.kept)?;
+        write_lines(dir, TRAJECTORY, &watched.trajectory.all())?;
+        let mut draws: Vec<ChainDraws> = watched.memories.iter().map(Memory::draws).collect();
+        // A run that may be resumed keeps all its draws.
+        let even = align(dir.path(), self.job.sampling.chains(), !interrupted)
+            .map_err(|e| plain(format!("{}: {e}; its draws are kept", dir.path().display())))?;
+        if let Some(even) = even {
+            draws.iter_mut().for_each(|d| d.rows.retain(|r| r.draw < even));
+        }
+        widen(&mut draws);
+        let points = ran.chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
+        let mut step_sizes = vec![None; draws.len()];
+        for (c, i) in ran.chains.iter().zip(&ran.places) {
+            step_sizes[*i] = c.kernels.iter().find_map(|k| k.step_size);
+        }
+        zarr::write(dir.path(), &draws, &step_sizes, &points).map_err(|e| {
+            plain(format!("{}: {e}; earlier output is kept", dir.file(zarr::ZARR).display()))
+        })?;
+        Ok(draws)
+    }
 
-/// Warns of choices that never moved in any chain and may hold each other in place.
-fn stuck_warning(state: &pcadlang_engine::trace::Trace, sites: &[SiteStats]) -> Option<String> {
-    let stuck = stuck_together(state, sites);
-    let others = stuck.len().checked_sub(1)?;
-    Some(format!(
-        "{} and {others} others that it depends on never moved in any chain, although other values \
-         are possible: the chains may not be able to leave the modes in which they began; draw \
-         such choices together, with exact($finite) or block(…)",
-        stuck.first()?
-    ))
+    /// Summarises the draws, and writes pictures of the best state and of each mode. Returns
+    /// fields of `run.json` too.
+    fn summarise(
+        &self,
+        ran: Started,
+        draws: &[ChainDraws],
+        interrupted: bool,
+    ) -> Result<(Outcome, Map<String, Value>), Failure> {
+        let Fill { job, ready, dir, watched, .. } = self;
+        let Started { chains, mut warnings, .. } = ran;
+        let (seed, image) = (job.sampling.seed, &ready.named_image);
+        let quantities = quantities(draws);
+        let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
+        let modes = modes(&quantities, Some(&self.evidence));
+        warnings.extend(pcadlang_report::warnings(&quantities, &modes, &kernels, chains.len()));
+        if ready.chooses {
+            let person = job.inputs.who.person.unwrap_or(1);
+            let of = |(name, image): &(String, _)| people::warnings(name, image, person);
+            warnings.extend(image.iter().flat_map(of));
+        }
+        let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
+        let last = chains.first().map(|c| &c.last);
+        warnings.extend(last.and_then(|state| structure_warning(state, &sites)));
+        warnings.extend(last.and_then(|state| stuck_warning(state, &sites)));
+        let inputs = image.as_ref().map(|(name, _)| name.as_str()).zip(ready.image());
+        let located = last.map_or_else(Vec::new, |state| state.located());
+        warnings.extend(seen::warnings(inputs, job.keypoints.as_deref(), &located));
+        let places = best_of_each(&modes, &watched.best);
+        let best = watched.best.state();
+        let drawn = show_best(dir, seed, &ready.model, best.as_deref(), &chains, ready.image())?;
+        show_places(dir, seed, &ready.model, &places, ready.photo())?;
+        let log_joint = best.as_ref().map_or(f64::NAN, |b| b.log_joint);
+        write_scene(dir, seed, ready, (log_joint, &drawn), &watched.kept.all())?;
+        warnings.extend(disagreement(&drawn));
+        warnings.extend(outside(&drawn));
+        let seconds = ready.begun.elapsed().as_secs_f64();
+        if let Some(found) =
+            drawn.view.as_ref().and_then(|v| self.joints.report(v, &modes, seconds))
+        {
+            let text = serde_json::to_vec_pretty(&found).unwrap_or_default();
+            write_in(dir, "keypoints.json", &text)?;
+            let picture = job.observe.first().map_or("", |o| stem(inputs::file_of(o)));
+            if let Some(coco) = coco(&found, picture) {
+                write_in(dir, "keypoints.coco.json", coco.to_string().as_bytes())?;
+            }
+        }
+        let mut more = counts(&chains, best.as_deref(), &quantities);
+        more.extend(drawn.agreement.map(|a| ("agreement".into(), json!(a))));
+        let outcome = Outcome {
+            approximate: approximate(job, &chains),
+            every: draws.iter().map(|d| d.every).max().unwrap_or(1),
+            quantities,
+            kernels,
+            sites,
+            modes,
+            warnings,
+            chains,
+            seconds,
+            interrupted,
+        };
+        Ok((outcome, more))
+    }
+
+    /// Writes the summary, the page, and last the record.
+    fn finish(
+        &self,
+        outcome: Outcome,
+        mut more: Map<String, Value>,
+        sampled: Duration,
+    ) -> Result<Outcome, Failure> {
+        let o = &outcome;
+        let summary = json!({
+            "quantities": summaries(&o.quantities, o.kernel_seconds()), "kernels": o.kernels,
+            "choices": o.sites, "modes": o.modes, "warnings": o.warnings,
+            "approximate": o.approximate, "every": o.every,
+        });
+        let text = serde_json::to_vec_pretty(&summary).unwrap_or_default();
+        write_in(self.dir, "summary.json", &text)?;
+        more.insert("sampling_seconds".into(), json!(sampled.as_secs_f64()));
+        more.insert("seconds".into(), json!(o.seconds));
+        let state = if o.interrupted { "interrupted" } else { "done" };
+        let run = recorded(self.record, state, Value::Object(more));
+        write_page(self.dir, &run, &summary, &o.quantities)?;
+        write_run(self.dir, &run)?;
+        Ok(outcome)
+    }
 }
 
 /// Writes the states kept so far, one per line, at intervals until the chains end.
@@ -556,7 +532,7 @@ fn sinks(
     model: &Model,
     memories: &[Memory],
     record: &Map<String, Value>,
-    manner: &RunMode,
+    mode: &RunMode,
 ) -> Result<Vec<Box<dyn Sink>>, Failure> {
     let run = identity(record);
     let comments = [
@@ -567,12 +543,12 @@ fn sinks(
     let files = ChainFiles { dir, run: &run, comments: &comments };
     let mut sinks: Vec<Box<dyn Sink>> = Vec::new();
     for (i, memory) in memories.iter().enumerate() {
-        let chain = match manner.resume {
+        let chain = match mode.resume {
             true => files.resume(i as u32, memory),
             false => files.begin(i as u32, memory),
         };
         let chain = chain.map_err(|e| plain(format!("{}: {e}", dir.path().display())))?;
-        sinks.push(match manner.stream {
+        sinks.push(match mode.stream {
             true => Box::new(Streamed::new(chain)),
             false => Box::new(chain),
         });

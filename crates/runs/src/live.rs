@@ -3,9 +3,9 @@
 
 use crate::args::Live;
 use crate::failure::{Failure, plain};
+use crate::inputs::Ready;
 use crate::progress::Ending;
 use crate::ration::Ration;
-use crate::ready::Ready;
 use crate::scene;
 use crate::watched::Watched;
 use pcadlang_inference::BestState;

@@ -1,11 +1,12 @@
-//! The progress line of a run on a terminal; elsewhere, one line every few seconds.
+//! The progress line of a run on a terminal; elsewhere, one line every few seconds. The end
+//! of a run, and Ctrl-C.
 
 use crate::term;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use pcadlang_inference::Progress;
 use pcadlang_report::{number, seconds};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
-use std::sync::{Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 /// The polling interval.
@@ -172,6 +173,55 @@ fn line(k: &Known, elapsed: Duration, limit: Option<Duration>) -> String {
 /// Formats a time in whole seconds, so that the line does not flicker.
 fn whole(t: Duration) -> String {
     if t.as_secs() < 120 { format!("{} s", t.as_secs()) } else { seconds(t.as_secs_f64()) }
+}
+
+/// Ctrl-C, which ends all current runs.
+#[derive(Default)]
+pub struct Interrupt {
+    asked: AtomicBool,
+    runs: Mutex<Vec<Weak<Progress>>>,
+}
+
+impl Interrupt {
+    /// Handles Ctrl-C from now on, until the command ends.
+    pub fn listen() -> Arc<Interrupt> {
+        let interrupt = Arc::new(Interrupt::default());
+        let heard = Arc::clone(&interrupt);
+        // If no handler can be set, the system's default stays. A second Ctrl-C exits
+        // without waiting for the end of the step; the files on the disk are complete
+        // then.
+        let _ = ctrlc::set_handler(move || {
+            if heard.asked.swap(true, Ordering::SeqCst) {
+                std::process::exit(130);
+            }
+            heard.pass_on();
+        });
+        interrupt
+    }
+
+    /// Returns whether the user has interrupted the command.
+    pub fn asked(&self) -> bool {
+        self.asked.load(Ordering::SeqCst)
+    }
+
+    /// Makes a run end at its next step after an interrupt, or at once if there was one
+    /// already.
+    pub fn ends(&self, run: &Arc<Progress>) {
+        let mut runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
+        runs.retain(|r| r.strong_count() > 0);
+        runs.push(Arc::downgrade(run));
+        drop(runs);
+        if self.asked() {
+            self.pass_on();
+        }
+    }
+
+    fn pass_on(&self) {
+        let runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
+        for run in runs.iter().filter_map(Weak::upgrade) {
+            run.cancelled.store(true, Ordering::Relaxed);
+        }
+    }
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use super::results;
 use super::runs::Runs;
 use super::sessions::{OpenSession, Sessions, job_of};
 use super::states::{no_view, picture};
+use pcadlang_engine::lang::builtins::data::from_json;
 use pcadlang_engine::trace::{Stop, Trace};
 use pcadlang_library::scene::ImageValue;
 use pcadlang_report::embedded;
@@ -19,7 +20,7 @@ use pcadlang_runs::scene;
 use pcadlang_runs::{files, inputs};
 use pcadlang_scene::render::View;
 use pcadlang_workbench::session::{
-    ChoiceRow, Layer, Marks, Request, Scores, from_json, observed_image, to_json,
+    ChoiceRow, Layer, Marks, Request, Scores, observed_image, to_json,
 };
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -262,7 +263,7 @@ impl Desk {
     }
 
     fn assign(&self, a: protocol::Assign) -> Result<Value, Failure> {
-        let value = from_json(&a.value).map_err(plain)?;
+        let value = from_json(a.value);
         let id = a.session;
         let said = self.sessions.get(id)?.ask(move |open| {
             let after = open.session.assign(&a.address, value, a.drag)?;

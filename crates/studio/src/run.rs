@@ -6,8 +6,8 @@ use pcadlang_inference::Progress;
 use pcadlang_report::RunDir;
 use pcadlang_runs::args::Job;
 use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::inputs::{self, Ready};
 use pcadlang_runs::job::{self, CHECKPOINT, Interrupt, RunMode};
-use pcadlang_runs::ready::{self, Ready};
 use pcadlang_runs::reopening::reopened::Reopened;
 use pcadlang_runs::resume;
 use pcadlang_runs::watched::Watched;
@@ -200,7 +200,7 @@ impl Run {
             return Err(plain("the run has not begun yet"));
         }
         let run = Reopened::open(&self.folder)?;
-        let ready = Arc::new(ready::prepare_program(run.program()?, &run.job, Instant::now())?);
+        let ready = Arc::new(inputs::prepare_program(run.program()?, &run.job, Instant::now())?);
         self.lock().ready = Some(Arc::clone(&ready));
         Ok(ready)
     }
@@ -294,9 +294,9 @@ impl Run {
         let ready = match resume {
             true => {
                 let run = Reopened::open(&self.folder)?;
-                ready::prepare_program(run.program()?, job, Instant::now())?
+                inputs::prepare_program(run.program()?, job, Instant::now())?
             }
-            false => ready::prepare(job, true)?,
+            false => inputs::prepare(job, true)?,
         };
         let watched = Arc::new(Watched::new(job, &ready.model, KEEP));
         let ready = Arc::new(ready);
@@ -315,7 +315,7 @@ impl Run {
             watched.progress.cancelled.store(self.stop.load(Ordering::SeqCst), Ordering::SeqCst);
             inner.record = Value::Object(record.clone());
         }
-        let manner = RunMode {
+        let mode = RunMode {
             live: false,
             checkpoint: CHECKPOINT,
             resume,
@@ -323,7 +323,7 @@ impl Run {
             follow: None,
             stream: false,
         };
-        let done = job::perform_watched(job, &ready, &dir, &record, interrupt, manner, &watched)?;
+        let done = job::perform_watched(job, &ready, &dir, &record, interrupt, mode, &watched)?;
         Ok(done.interrupted)
     }
 

@@ -9,7 +9,7 @@ use pcadlang_inference::{KeptTrace, TrajectoryState};
 use pcadlang_library::scene::ImageValue;
 use pcadlang_report::Mode;
 use pcadlang_runs::failure::{Failure, plain};
-use pcadlang_runs::ready::Ready;
+use pcadlang_runs::inputs::Ready;
 use pcadlang_runs::reopening::film::best_chain;
 use pcadlang_runs::reopening::reopened::Reopened;
 use pcadlang_runs::scene;

@@ -2,8 +2,8 @@
 
 use super::{Views, afresh, contour_bits, frame_bits};
 use glam::DVec3;
-use pcadlang_scene::geom::{Affine, Caps, Mesh, Profile, Solid, sphere};
-use pcadlang_scene::render::{Camera, Channels, Contours, Frame, Projection, View};
+use pcadlang_scene::geom::{Affine, Mesh, Solid, sphere};
+use pcadlang_scene::render::{Camera, Channels, Contours, Frame, Projection};
 use std::sync::Arc;
 
 fn ball(at: f64, radius: f64) -> Solid {

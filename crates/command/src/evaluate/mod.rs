@@ -17,8 +17,8 @@ use pcadlang_report::evaluation::{
 use pcadlang_report::{RunDir, bytes_hash, r_hat_text, seconds};
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::job::{CHECKPOINT, Interrupt, RunMode};
-use pcadlang_runs::{edges, term};
-use pcadlang_runs::{inputs, job, quality, ready, resume};
+use pcadlang_runs::term;
+use pcadlang_runs::{inputs, job, quality, resume};
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 use std::time::Instant;
@@ -113,7 +113,7 @@ impl<'a> Evaluation<'a> {
         let items = Items::of(&program, detections.is_some())?;
         program.without_data().compile()?;
         let dir = EvaluationDir::open(&a.out).map_err(|e| plain(e.to_string()))?;
-        let edges = edges::bytes(a.inputs.edges.as_deref())?;
+        let edges = inputs::detector_bytes(a.inputs.edges.as_deref())?;
         let mut said = None;
         let task = |case: Case| {
             let camera = case.camera.clone().or_else(|| a.inputs.camera.clone());
@@ -224,12 +224,12 @@ impl<'a> Evaluation<'a> {
     fn fill(&self, t: &Task) -> Result<(), Failure> {
         let dir = RunDir::create(&self.dir.file(&t.case.name)).map_err(|e| plain(e.to_string()))?;
         let begun = Instant::now();
-        let ready = ready::prepare(&t.job, true).inspect_err(|failure| {
+        let ready = inputs::prepare(&t.job, true).inspect_err(|failure| {
             // An error in writing the record must not hide the first error.
             let _ = job::record_failure(&dir, &t.record, failure, begun.elapsed().as_secs_f64());
         })?;
         let live = !(self.a.quiet || self.a.json);
-        let manner = RunMode {
+        let mode = RunMode {
             live,
             checkpoint: CHECKPOINT,
             resume: false,
@@ -237,7 +237,7 @@ impl<'a> Evaluation<'a> {
             follow: None,
             stream: false,
         };
-        job::perform(&t.job, &ready, &dir, &t.record, &self.interrupt, manner).map(|_| ())
+        job::perform(&t.job, &ready, &dir, &t.record, &self.interrupt, mode).map(|_| ())
     }
 
     fn rows(&self) -> Vec<Row> {

@@ -12,10 +12,10 @@ use pcadlang_library::Model;
 use pcadlang_report::{RunDir, number, seconds, table};
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::files::write_in;
+use pcadlang_runs::inputs::{self, Ready};
 use pcadlang_runs::job::{self, Interrupt};
 use pcadlang_runs::progress::{self, Ending};
 use pcadlang_runs::quality;
-use pcadlang_runs::ready::{self, Ready};
 use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ const EXTREME: f64 = 0.01;
 pub fn predict(a: &Predict) -> Result<(), Failure> {
     let begun = Instant::now();
     let job = &quality::filled(&a.job, a.prior)?;
-    let ready = ready::prepare(job, false)?;
+    let ready = inputs::prepare(job, false)?;
     let model = &ready.model;
     let (what, draws) = match a.prior {
         true => ("prior", vec![from_prior(a, model)?]),

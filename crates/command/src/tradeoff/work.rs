@@ -10,10 +10,10 @@ use pcadlang_inference::{BestSoFar, BestState, Callback, Callbacks, Progress};
 use pcadlang_library::scene::ViewValue;
 use pcadlang_report::{Memory, Moments, Tee, quantities};
 use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::inputs::{self, Ready};
 use pcadlang_runs::job::{self, Interrupt};
 use pcadlang_runs::keypoints::Joints;
 use pcadlang_runs::progress::Ending;
-use pcadlang_runs::ready::{self, Ready};
 use pcadlang_runs::scene;
 use pcadlang_scene::render::View;
 use pcadlang_workbench::score::Surface;
@@ -117,7 +117,7 @@ fn measure(
 ) -> Result<RunRecord, Failure> {
     let job = job(a, task, threads);
     let begun = Instant::now();
-    let ready = ready::prepare(&job, true)?;
+    let ready = inputs::prepare(&job, true)?;
     let chains = job.sampling.chains();
     let progress = Arc::new(Progress::default());
     let watched = Watched {

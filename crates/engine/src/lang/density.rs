@@ -29,7 +29,7 @@ fn tells_nothing(dist: &Dist) -> bool {
 /// Returns the log density of an observed value under a likelihood.
 pub(crate) fn likelihood_score(v: &Value, observed: &Value) -> Result<f64, Fault> {
     let Value::Likelihood(l) = v else { return Err(Fault::type_error("not a likelihood")) };
-    let score = l.log_density(observed).map_err(Fault::type_error)?;
+    let score = l.log_density(observed)?;
     if score.is_nan() {
         return Err(Fault::domain(format!("the likelihood `{}` is NaN here", l.name())));
     }
@@ -244,6 +244,7 @@ pub(crate) fn by_arguments(a: &Args, dist: &Dist, params: &[f64]) -> SmallVec<[A
     let one = |i: usize| -> Adjoint {
         match a.get(i) {
             _ if covariance == Some(i) => Adjoint::Unknown,
+            _ if matches!(a.values[i], Value::Unit) && matches!(dist, Dist::Gp(_)) => Adjoint::Zero,
             // The jitter.
             Value::Num(_) if i == 4 && matches!(dist, Dist::Gp(_)) => Adjoint::Unknown,
             Value::Num(_) if matches!(dist, Dist::Gp(_)) => {

@@ -55,6 +55,12 @@ impl Fault {
         Fault::new(FaultKind::Type, message)
     }
 
+    /// Names the function in which it arose.
+    #[doc(hidden)]
+    pub fn of(self, function: &str) -> Self {
+        Fault { message: format!("{function}: {}", self.message), ..self }
+    }
+
     /// Adds a hint.
     pub fn with_hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = Some(hint.into());

@@ -9,6 +9,7 @@
 //! value recursively: size and depth are limited.
 
 use super::adjoint::Adjoint;
+use super::fault::Fault;
 use indexmap::IndexMap;
 use pcadlang_numerics::dist::{Datum, Dist};
 use pcadlang_numerics::rng::Stream;
@@ -82,7 +83,7 @@ pub trait Object: Any + fmt::Debug + Send + Sync {
     /// Returns `self` for downcasting.
     fn as_any(&self) -> &dyn Any;
     /// Returns `self * other`, if the type defines it (a placement times a solid).
-    fn multiply(&self, _other: &Value) -> Option<Result<Value, String>> {
+    fn multiply(&self, _other: &Value) -> Option<Result<Value, Fault>> {
         None
     }
     /// Returns the adjoints of both sides of `self * other`; `None` if they are not
@@ -141,8 +142,9 @@ pub trait Likelihood: fmt::Debug + Send + Sync {
     /// Returns the log density; never NaN.
     ///
     /// # Errors
-    /// If the observed value has the wrong type or cannot be compared.
-    fn log_density(&self, observed: &Value) -> Result<f64, String>;
+    /// If the observed value has the wrong type or cannot be compared ([`Fault::type_error`]);
+    /// a state that is impossible may be a [`Fault::domain`], which rejects it.
+    fn log_density(&self, observed: &Value) -> Result<f64, Fault>;
     /// Returns the derivatives of the log density with respect to the arguments of the
     /// likelihood, in the form that the derivative of the built-in that makes it expects;
     /// `None` if they are not known.
@@ -160,7 +162,7 @@ pub trait Likelihood: fmt::Debug + Send + Sync {
     ///
     /// # Errors
     /// The inner result fails as [`Likelihood::log_density`].
-    fn sample(&self, _observed: &Value, _rng: &mut Stream) -> Option<Result<Value, String>> {
+    fn sample(&self, _observed: &Value, _rng: &mut Stream) -> Option<Result<Value, Fault>> {
         None
     }
     /// Returns named points of the scene at the positions that the observation gives

@@ -14,7 +14,6 @@ use super::update::Failure;
 use super::{Address, Draws, Trace, TraceResult, Weight};
 use crate::lang::code::{Code, DistSpec, Observed, Op, Operand};
 use crate::lang::density::{is_repeated, pointwise};
-use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use pcadlang_numerics::dist::{Datum, Dist, Support};
 use pcadlang_numerics::rng::Stream;
@@ -283,7 +282,7 @@ impl Graph {
             && let Value::Likelihood(l) = self.value(code, frame, *o)
         {
             return match l.sample(observed, rng) {
-                Some(drawn) => drawn.map(Ok).map_err(|e| self.fault(code, n, Fault::type_error(e))),
+                Some(drawn) => drawn.map(Ok).map_err(|f| self.fault(code, n, f)),
                 None => Ok(Err(format!("the likelihood `{}`", l.name()))),
             };
         }

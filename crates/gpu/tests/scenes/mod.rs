@@ -3,7 +3,7 @@
 use glam::DVec3;
 use pcadlang_gpu::{ContourBatch, Scene};
 use pcadlang_scene::geom::armature::{Armature, JointPose, Rules, rig_from_json};
-use pcadlang_scene::geom::{Affine, Caps, Profile, Solid, lathe, obj};
+use pcadlang_scene::geom::{Affine, Caps, Profile, Solid, obj};
 use pcadlang_scene::render::{Camera, ContourSlice};
 use std::error::Error;
 use std::sync::Arc;
@@ -71,7 +71,7 @@ pub fn lathe(seed: u64, sides: u32, wall: f64, caps: Caps) -> Result<Solid, Box<
     let profile = [profile(seed)];
     Ok(match sides {
         0 => Solid::exact_lathe(&profile, 96, wall, caps)?,
-        _ => Solid::new(Arc::new(lathe(&profile, sides, wall, caps)?)),
+        _ => Solid::new(pcadlang_scene::geom::lathe(&profile, sides, wall, caps)?.into()),
     })
 }
 

@@ -5,7 +5,7 @@ use crate::calls::error::fail;
 use crate::calls::formula::{PlanEnv, evaluate};
 use crate::calls::selection::{scope, selector};
 use crate::kernel::{Kernel, SiteSelection};
-use pcadlang_engine::lang::builtins::Builtin;
+use pcadlang_engine::lang::builtins::{Builtin, Which};
 use pcadlang_engine::lang::error::RunError;
 use pcadlang_engine::lang::plan::{Argument, KernelCall};
 use pcadlang_engine::lang::value::Value;
@@ -34,9 +34,8 @@ impl<'a> Call<'a, '_> {
         fail(self.call.span, format!("`{}` is not a kernel", self.builtin.name))
     }
 
-    fn name(&self, place: usize) -> &'a str {
-        let builtin = self.builtin;
-        builtin.args.get(place).map_or("", |a| &a.name)
+    fn place(&self, which: impl Which) -> usize {
+        which.position(&self.builtin.args)
     }
 
     /// The kernel that this one applies.
@@ -64,8 +63,10 @@ impl<'a> Call<'a, '_> {
     }
 
     /// The choices that an argument selects, without frozen ones.
-    pub fn scope(&mut self, place: usize) -> Result<Option<SiteSelection>, Box<RunError>> {
-        let Some(Argument::Choices(c)) = self.call.args.get(place) else { return Ok(None) };
+    pub fn scope(&mut self, which: impl Which) -> Result<Option<SiteSelection>, Box<RunError>> {
+        let Some(Argument::Choices(c)) = self.call.args.get(self.place(which)) else {
+            return Ok(None);
+        };
         let SiteSelection { selector, pick } = scope(c, self.env)?;
         let selector = match self.setting.frozen {
             Selector::Nothing => selector,
@@ -75,66 +76,53 @@ impl<'a> Call<'a, '_> {
     }
 
     /// The finite choices that a kernel sums out; none unless given.
-    pub fn marginal(&mut self, place: usize) -> Result<Selector, Box<RunError>> {
-        Ok(self.scope(place)?.map_or(Selector::Nothing, |s| s.selector))
+    pub fn marginal(&mut self) -> Result<Selector, Box<RunError>> {
+        Ok(self.scope("marginal")?.map_or(Selector::Nothing, |s| s.selector))
     }
 
     /// The observations that surrogates replace; none unless given.
-    pub fn selector(&mut self, place: usize) -> Result<Selector, Box<RunError>> {
-        match self.call.args.get(place) {
+    pub fn selector(&mut self, which: impl Which) -> Result<Selector, Box<RunError>> {
+        match self.call.args.get(self.place(which)) {
             Some(Argument::Choices(c)) => selector(&c.selection, self.env),
             _ => Ok(Selector::Nothing),
         }
     }
 
-    /// A value and where it is written, if it is given.
-    pub fn value(&mut self, place: usize) -> Result<Option<(Value, Span)>, Box<RunError>> {
+    /// The value of an argument, or its default, and where it is written.
+    pub fn value(&mut self, which: impl Which) -> Result<(Value, Span), Box<RunError>> {
+        let place = self.place(which);
         match self.call.args.get(place) {
-            Some(Argument::Value(f)) => Ok(Some((evaluate(f, self.env)?, f.span))),
-            _ => Ok(None),
+            Some(Argument::Value(f)) => Ok((evaluate(f, self.env)?, f.span)),
+            _ => Ok((self.builtin.args[place].value.clone(), self.call.span)),
         }
     }
 
-    /// A positive number, if it is given.
-    pub fn positive(&mut self, place: usize) -> Result<Option<f64>, Box<RunError>> {
-        let (kernel, name) = (&self.builtin.name, self.name(place));
-        match self.value(place)? {
-            None => Ok(None),
-            Some((Value::Num(x), _)) if x > 0.0 => Ok(Some(x)),
-            Some((v, span)) => {
+    /// A positive number; `None` if it is left to the kernel.
+    pub fn positive_if_given(&mut self, name: &str) -> Result<Option<f64>, Box<RunError>> {
+        match self.value(name)? {
+            (Value::Unit, _) => Ok(None),
+            (Value::Num(x), _) if x > 0.0 => Ok(Some(x)),
+            (v, span) => {
+                let kernel = &self.builtin.name;
                 Err(fail(span, format!("{kernel}: `{name}` must be positive, got {v}")))
             }
         }
     }
 
-    /// A truth value; false unless given.
-    pub fn truth(&mut self, place: usize) -> Result<bool, Box<RunError>> {
-        let name = self.name(place);
-        match self.value(place)? {
-            None => Ok(false),
-            Some((Value::Bool(b), _)) => Ok(b),
-            Some((v, span)) => Err(fail(span, format!("`{name}` must be true or false, got {v}"))),
+    /// A truth value.
+    pub fn truth(&mut self, name: &str) -> Result<bool, Box<RunError>> {
+        match self.value(name)? {
+            (Value::Bool(b), _) => Ok(b),
+            (v, span) => Err(fail(span, format!("`{name}` must be true or false, got {v}"))),
         }
     }
 
-    /// A whole number.
-    pub fn whole(
-        &mut self,
-        place: usize,
-        default: u32,
-        least: u32,
-        most: u32,
-    ) -> Result<u32, Box<RunError>> {
-        let name = self.name(place);
-        let is_whole =
-            |x: f64| x >= f64::from(least) && x <= f64::from(most) && x == libm::trunc(x);
-        match self.value(place)? {
-            None => Ok(default),
-            Some((Value::Num(x), _)) if is_whole(x) => Ok(x as u32),
-            Some((v, span)) => {
-                let rule = format!("a whole number from {least} to {most}");
-                Err(fail(span, format!("`{name}` must be {rule}, got {v}")))
-            }
+    /// A whole number within the declared bounds.
+    pub fn whole(&mut self, name: &str) -> Result<u32, Box<RunError>> {
+        let domain = self.builtin.args[self.place(name)].domain;
+        match self.value(name)? {
+            (Value::Num(x), _) if domain.holds(x) => Ok(x as u32),
+            (v, span) => Err(fail(span, format!("`{name}` must be {domain}, got {v}"))),
         }
     }
 }

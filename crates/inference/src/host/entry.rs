@@ -9,7 +9,8 @@ use crate::{Kernel, KernelCall};
 use pcadlang_engine::lang::adjoint::Adjoint;
 use pcadlang_engine::lang::builtins::data::{self, DataFormat};
 use pcadlang_engine::lang::builtins::{
-    Args, Argument, Builtin, Derivative, HostItem, Kind, PreviousEvaluation, Row, State, Type,
+    Args, Argument, Builtin, Derivative, Domain, HostItem, Kind, PreviousEvaluation, Row, State,
+    Type,
 };
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_engine::lang::value::{Likelihood, Value};
@@ -160,7 +161,15 @@ impl Entry {
         about: impl Into<Cow<'static, str>>,
     ) -> Entry {
         let (name, doc) = (name.into(), about.into());
-        self.push(Argument { name, ty, unit: "".into(), default: None, value: Value::Unit, doc })
+        self.push(Argument {
+            name,
+            ty,
+            unit: "".into(),
+            domain: Domain::Any,
+            default: None,
+            value: Value::Unit,
+            doc,
+        })
     }
 
     /// Appends an optional argument with its default.
@@ -176,6 +185,7 @@ impl Entry {
         self.push(Argument {
             name,
             ty,
+            domain: Domain::Any,
             unit: "".into(),
             default: Some(value.to_string().into()),
             value,
@@ -185,11 +195,21 @@ impl Entry {
 
     /// Sets the unit of the argument declared last.
     #[must_use]
-    pub fn unit(mut self, unit: impl Into<Cow<'static, str>>) -> Entry {
+    pub fn unit(self, unit: impl Into<Cow<'static, str>>) -> Entry {
+        self.of_last("a unit", |a| a.unit = unit.into())
+    }
+
+    /// Restricts the values of the argument declared last: [`Args`] reads no others.
+    #[must_use]
+    pub fn within(self, domain: Domain) -> Entry {
+        self.of_last("a domain", |a| a.domain = domain)
+    }
+
+    fn of_last(mut self, what: &str, set: impl FnOnce(&mut Argument)) -> Entry {
         let mut args = self.builtin.args.to_vec();
         match args.last_mut() {
-            Some(a) => a.unit = unit.into(),
-            None => self.wrong = Some("a unit must belong to an argument".into()),
+            Some(a) => set(a),
+            None => self.wrong = Some(format!("{what} must belong to an argument")),
         }
         self.builtin.args = args.into();
         self

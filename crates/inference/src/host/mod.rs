@@ -15,10 +15,10 @@ pub use entry::Entry;
 pub use pcadlang_engine::lang::adjoint::Adjoint;
 #[doc(inline)]
 pub use pcadlang_engine::lang::builtins::data::{
-    Beside, DataFormat, Literal, Options as DataOptions,
+    DataFormat, Literal, Options as DataOptions, ReadRelative,
 };
 #[doc(inline)]
-pub use pcadlang_engine::lang::builtins::{Args, Defaults, InputHook, Type};
+pub use pcadlang_engine::lang::builtins::{Args, Defaults, Domain, InputHook, Type};
 #[doc(inline)]
 pub use pcadlang_engine::lang::error::{Fault, FaultKind};
 #[doc(inline)]

@@ -9,7 +9,7 @@
 //! square of the differences between the observed and the simulated numbers.
 
 use super::AbcSmc;
-use super::row::{Built, INNER, KernelRow, Type, arg, number, opt};
+use super::row::{Built, Domain, INNER, KernelRow, Type, arg, int, number, opt};
 use crate::calls::error::fail;
 use crate::kernel::{Kernel, Outcome, StepContext};
 use crate::state::{StateError, pack, unpack};
@@ -30,8 +30,9 @@ pub(crate) const ROW: KernelRow = KernelRow::new(
             "none",
             "With this many particles, each step draws a complete state as `smc` does, with \
              tolerances decreasing to `eps` (Del Moral et al. 2012).",
-        ),
-        opt("moves", Type::Int, "1", "The number of moves of each particle at each tolerance."),
+        )
+        .within(Domain::Whole([2, 1_000_000])),
+        int("moves", 1, [1, 10_000], "The number of moves of each particle at each tolerance."),
     ],
     "Approximate Bayesian computation (likelihood-free): the inner kernel targets the prior, \
      and a proposal is accepted if data simulated from it are within `eps` of the observed \
@@ -39,12 +40,12 @@ pub(crate) const ROW: KernelRow = KernelRow::new(
     number!("infer { repeat 100 { abc(block(@**), eps = 0.5); collect x; } }"),
     |call| {
         let inner = call.inner()?;
-        let eps = call.positive(1)?.unwrap_or(f64::INFINITY);
-        if call.value(2)?.is_none() {
+        let eps = call.positive_if_given("eps")?.unwrap_or(f64::INFINITY);
+        if matches!(call.value("particles")?.0, Value::Unit) {
             let signature = format!("abc({}, {eps})", inner.signature);
             return Ok(Built::new(Abc::new(inner.kernel, eps, call.span()), signature));
         }
-        let (particles, moves) = (call.whole(2, 100, 2, 1_000_000)?, call.whole(3, 1, 1, 10_000)?);
+        let (particles, moves) = (call.whole("particles")?, call.whole("moves")?);
         let signature = format!("abc({}, {eps}, {particles}, {moves})", inner.signature);
         let (size, frozen) = ((particles as usize, moves), call.frozen());
         Ok(Built::new(AbcSmc::new(inner.kernel, eps, size, frozen, call.span()), signature))

@@ -29,7 +29,7 @@ observe normal(x, 1) = 2 with coarse = normal(x, 1.5) as y;
 infer { repeat 100 { delayed(mh(@x), at = @y); collect x; } }",
     |call| {
         let inner = call.inner()?;
-        let at = call.selector(1)?;
+        let at = call.selector("at")?;
         let signature = format!("delayed({}, {at:?})", inner.signature);
         Ok(Built::new(Delayed::new(inner.kernel, at, call.span()), signature))
     },

@@ -32,7 +32,7 @@ pub(crate) const ROW: KernelRow = KernelRow::new(
     ],
     "Gaussian random walk in the unconstrained space; discrete choices move to another value.",
     number!("infer { warmup 200 { drift(@x); } repeat 100 { drift(@x); collect x; } }"),
-    |call| call.moving(|scope, call| Ok(Drift::new(scope, call.positive(1)?))),
+    |call| call.moving(|scope, call| Ok(Drift::new(scope, call.positive_if_given("scale")?))),
 );
 
 /// The target acceptance rates in one dimension and in many (Roberts & Rosenthal 2001).

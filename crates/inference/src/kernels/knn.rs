@@ -20,7 +20,7 @@
 //! Densities are relative to the prior's, which cancels the prior terms of
 //! [`Weight::log_weight`](pcadlang_engine::trace::Weight).
 
-use super::row::{KernelRow, SEL, Type, arg, opt};
+use super::row::{KernelRow, SEL, Type, arg, int};
 use crate::calls::call::Call;
 use crate::calls::error::fail;
 use crate::kernel::{
@@ -28,6 +28,7 @@ use crate::kernel::{
 };
 use crate::neighbours::{Latent, Neighbours};
 use crate::run::RunOptions;
+use pcadlang_engine::lang::builtins::Domain;
 use pcadlang_engine::lang::error::RunError;
 use pcadlang_engine::lang::plan::{Argument, FormulaKind, KernelCall};
 use pcadlang_engine::lang::value::Value;
@@ -45,7 +46,7 @@ pub(crate) const ROW: KernelRow = KernelRow::new(
     &[
         SEL,
         arg("bank", Type::Str, "A file made by `pcadlang learn`."),
-        opt("k", Type::Int, "10", "The number of neighbours."),
+        int("k", USUAL, [1, MOST], "The number of neighbours."),
     ],
     "Data-driven independence proposal: a kernel density estimate over the latents of the \
      bank's pictures nearest to the observed one.",
@@ -59,10 +60,10 @@ infer { repeat 100 { knn(@**, bank = \"balls.bank\", k = 5); collect r; } }",
 )
 .checked(check);
 
-/// The number of neighbours, if a call does not specify it.
-const K: usize = 10;
+/// The default number of neighbours.
+const USUAL: u32 = 10;
 /// The most neighbours: more of them are no more informative than the prior.
-const MOST: f64 = 10_000.0;
+const MOST: u32 = 10_000;
 
 /// The weight of the prior in the mixture, so that the proposal covers the support of the
 /// posterior.
@@ -133,33 +134,28 @@ impl Knn {
 /// before the chain begins. A bank whose name is computed is looked up when the kernel is
 /// made.
 fn check(call: &KernelCall, options: &RunOptions) -> Result<(), Box<RunError>> {
-    let written = |place| match call.args.get(place) {
-        Some(Argument::Value(f)) => Some(&f.kind),
-        _ => None,
+    let Some(Argument::Value(bank)) = call.args.get(1) else { return Ok(()) };
+    let k = match call.args.get(2) {
+        Some(Argument::Value(f)) => match &f.kind {
+            FormulaKind::Const(Value::Num(x)) if Domain::Whole([1, MOST]).holds(*x) => *x as u32,
+            _ => return Ok(()),
+        },
+        _ => USUAL,
     };
-    let k = match written(2) {
-        None => K,
-        Some(FormulaKind::Const(Value::Num(x))) => count(*x).unwrap_or(K),
-        Some(_) => return Ok(()),
-    };
-    match written(1) {
-        Some(FormulaKind::Const(Value::Str(bank))) => find(options, call.span, bank, k).map(|_| ()),
+    match &bank.kind {
+        FormulaKind::Const(Value::Str(name)) => find(options, call.span, name, k).map(|_| ()),
         _ => Ok(()),
     }
-}
-
-fn count(x: f64) -> Option<usize> {
-    ((1.0..=MOST).contains(&x) && x == libm::trunc(x)).then_some(x as usize)
 }
 
 fn find(
     options: &RunOptions,
     span: Span,
     bank: &str,
-    k: usize,
+    k: u32,
 ) -> Result<Arc<Neighbours>, Box<RunError>> {
     match &options.banks {
-        Some(banks) => banks.neighbours(bank, k).map_err(|message| fail(span, message)),
+        Some(banks) => banks.neighbours(bank, k as usize).map_err(|message| fail(span, message)),
         None => Err(fail(span, format!("knn: the bank {bank:?} is not known to this run"))),
     }
 }
@@ -169,20 +165,11 @@ fn find(
 /// # Errors
 /// If its arguments are wrong, or the bank cannot be used.
 fn neighbours(call: &mut Call) -> Result<Arc<Neighbours>, Box<RunError>> {
-    let bank = match call.value(1)? {
-        Some((Value::Str(bank), _)) => bank,
-        Some((v, span)) => {
-            return Err(fail(span, format!("knn: `bank` must be a string, got {v}")));
-        }
-        None => return Err(fail(call.span(), "knn needs a bank made by `pcadlang learn`".into())),
+    let bank = match call.value("bank")? {
+        (Value::Str(bank), _) => bank,
+        (v, span) => return Err(fail(span, format!("knn: `bank` must be a string, got {v}"))),
     };
-    let wrong =
-        |v, span| fail(span, format!("knn: `k` must be a whole number from 1 to {MOST}, got {v}"));
-    let k = match call.value(2)? {
-        None => K,
-        Some((Value::Num(x), span)) => count(x).ok_or_else(|| wrong(Value::Num(x), span))?,
-        Some((v, span)) => return Err(wrong(v, span)),
-    };
+    let k = call.whole("k")?;
     find(call.setting.options, call.span(), &bank, k)
 }
 

@@ -6,7 +6,7 @@
 //! program is undefined, or choices appear or vanish, counts as outside the slice, so the
 //! kernel moves within the present structure.
 
-use super::row::{KernelRow, SEL, Type, number, opt};
+use super::row::{KernelRow, SEL, Type, flag, number, opt};
 use crate::kernel::{Kernel, Outcome, Registered, SiteSelection, StepContext, recoverable};
 use crate::state::{StateError, in_order, pack, unpack};
 use pcadlang_engine::trace::{Change, Target, Trace, TraceResult};
@@ -24,17 +24,19 @@ pub(crate) const ROW: KernelRow = KernelRow::new(
             "The width of the initial interval, in the unconstrained space; by default 1, \
              adapted in warm-up.",
         ),
-        opt(
+        flag(
             "doubling",
-            Type::Bool,
-            "false",
             "Expands the interval by doubling instead of stepping out: for slices much wider \
              than `width`.",
         ),
     ],
     "Slice sampling of one number at a time with stepping out or doubling (Neal 2003).",
     number!("infer { repeat 100 { slice(@x, width = 2); collect x; } }"),
-    |call| call.moving(|scope, call| Ok(Slice::new(scope, call.positive(1)?, call.truth(2)?))),
+    |call| {
+        call.moving(|scope, call| {
+            Ok(Slice::new(scope, call.positive_if_given("width")?, call.truth("doubling")?))
+        })
+    },
 );
 
 /// The most widths of stepping out, divided at random between both sides, which keeps the

@@ -11,7 +11,7 @@
 //! each, and are fixed from then on.
 
 use super::particles::{Independent, ParticlePath, Prior};
-use super::row::{Built, INNER, KernelRow, Type, number, opt};
+use super::row::{Built, INNER, KernelRow, int, number};
 use crate::kernel::{Kernel, StepContext, inner_step};
 use crate::resampling::systematic;
 use crate::state::{StateError, holds, pack, unpack};
@@ -21,14 +21,14 @@ use pcadlang_syntax::span::Span;
 
 pub(crate) const ROW: KernelRow = KernelRow::new(
     "smc",
-    &[INNER, opt("particles", Type::Int, "100", "The number of particles.")],
+    &[INNER, int("particles", 100, [2, 1_000_000], "The number of particles.")],
     "Proposes complete states by annealed sequential Monte Carlo with the inner kernel, \
      accepted by their evidence estimates (particle independent Metropolis-Hastings, Andrieu \
      et al. 2010). No other kernel may change the state in between.",
     number!("infer { repeat 20 { smc(drift(@x), particles = 20); collect x; } }"),
     |call| {
         let inner = call.inner()?;
-        let particles = call.whole(1, 100, 2, 1_000_000)?;
+        let particles = call.whole("particles")?;
         let signature = format!("smc({}, {particles})", inner.signature);
         let smc = Smc::new(inner.kernel, particles as usize, call.frozen(), call.span());
         Ok(Built::new(smc, signature))

@@ -7,7 +7,7 @@
 //! even and odd pairs (Okabe et al. 2001). In warm-up the powers are adapted so that all
 //! neighbours swap about equally often (Miasojedow, Moulines & Vihola 2013).
 
-use super::row::{Built, INNER, KernelRow, Type, number, opt};
+use super::row::{Built, INNER, KernelRow, int, num, number};
 use crate::kernel::{Kernel, Outcome, StepContext, accepts, inner_step};
 use crate::state::{StateError, holds, pack, unpack};
 use pcadlang_engine::trace::{Constraint, Trace, TraceResult};
@@ -16,11 +16,10 @@ pub(crate) const ROW: KernelRow = KernelRow::new(
     "temper",
     &[
         INNER,
-        opt("levels", Type::Int, "6", "The number of temperatures."),
-        opt(
+        int("levels", 6, [2, 1000], "The number of temperatures."),
+        num(
             "hottest",
-            Type::Num,
-            "0.01",
+            0.01,
             "The lowest power of the likelihood; warm-up adapts the ladder of temperatures.",
         ),
     ],
@@ -34,8 +33,8 @@ infer {
 }"
     ),
     |call| {
-        let levels = call.whole(1, 6, 2, 1000)?;
-        let hottest = call.positive(2)?.unwrap_or(0.01);
+        let levels = call.whole("levels")?;
+        let hottest = call.positive_if_given("hottest")?.unwrap_or(1.0);
         let inner = (0..levels).map(|_| call.inner()).collect::<Result<Vec<_>, _>>()?;
         let signature = format!("temper({}, {levels}, {hottest})", inner[0].signature);
         let inner = inner.into_iter().map(|b| b.kernel).collect();

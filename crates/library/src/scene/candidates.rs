@@ -2,10 +2,10 @@
 //! [`pcadlang_scene::vision::candidates`].
 
 use super::observed::MaskValue;
-use super::{CAMERA, CameraValue, IMAGE, ImageValue, native};
+use super::seeing::camera;
+use super::{CAMERA, IMAGE, ImageValue, native};
 use glam::DVec3;
-use pcadlang_engine::lang::builtins::{Row, Type, arg, opt};
-use pcadlang_engine::lang::error::{Fault, FaultKind};
+use pcadlang_engine::lang::builtins::{Row, Type, arg, int, opt};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::render::{Camera, Projection};
 use pcadlang_scene::vision::candidates::{
@@ -22,12 +22,12 @@ pub(super) const TABLE: &[Row] = &[native(
             IMAGE,
             "The photograph; from a contour map alone, the enclosed regions are used.",
         ),
-        opt("most", Type::Int, "20", "The maximum number of candidates, 1 to 64."),
-        opt(
+        int("most", 20, [1, 64], "The maximum number of candidates."),
+        int(
             "size",
-            Type::Int,
-            "128",
-            "The longer side of the picture that is analysed, 32 to 512; 256 for a contour map.",
+            128,
+            [32, 512],
+            "The longer side of the picture that is analysed; 256 for a contour map.",
         )
         .unit("pixels"),
         opt("camera", CAMERA, "the run's", "The camera; by default, that of the run."),
@@ -48,24 +48,18 @@ pub(super) const TABLE: &[Row] = &[native(
         }
         let image = a.object::<ImageValue>(0, "an image")?;
         let (width, height) = image.size();
-        let most = if a.given(1) {
-            a.int_in(1, 1, 64)? as usize
-        } else {
-            CandidateOptions::default().most
+        // Regions of a contour map are enclosed by thin lines.
+        let size = match image.as_photo() {
+            None if !a.is_written("size") => 256,
+            _ => a.int("size")?,
         };
-        let usual = if image.as_photo().is_some() { CandidateOptions::default().size } else { 256 };
-        let size = if a.given(2) { a.int_in(2, 32, 512)? as u32 } else { usual };
-        let camera = match a.given(3) {
-            true => a.object::<CameraValue>(3, "a camera")?.0,
-            false => Camera::default_for(width, height),
-        };
-        let options = CandidateOptions { most, size };
-        let found = image.candidates.get(options, |o| match image.as_photo() {
+        let camera = camera(a, (width, height))?;
+        let options = CandidateOptions { most: a.int("most")? as usize, size };
+        let found = image.prepared.get(options, |o| match image.as_photo() {
             Some(photo) => Ok(candidates(photo, o)),
             None => Ok(enclosed(image.map()?, o)),
         });
-        let found = found
-            .map_err(|e: String| Fault::new(FaultKind::Other, format!("scene.candidates: {e}")))?;
+        let found: Arc<Vec<Candidate>> = found.map_err(|f| f.of("scene.candidates"))?;
         let scale = [
             f64::from(camera.width) / f64::from(width.max(1)),
             f64::from(camera.height) / f64::from(height.max(1)),

@@ -2,30 +2,31 @@
 
 use super::adjoints::BySolid;
 use super::observed::{DepthValue, ImageValue, MaskValue};
-use super::shared_tally::SharedTally;
 use super::{VIEW, ViewValue, incremental, native};
 use pcadlang_engine::lang::adjoint::Adjoint;
 use pcadlang_engine::lang::builtins::{
-    Arg, ArgAdjoints, Args, PreviousEvaluation, Row, State, Type, arg, opt,
+    Arg, ArgAdjoints, Args, PreviousEvaluation, Row, State, Type, arg, flag, int, num, opt, word,
 };
 use pcadlang_engine::lang::error::Fault;
-use pcadlang_engine::lang::value::{Likelihood, Value};
+use pcadlang_engine::lang::value::{Likelihood, Object, Value};
 use pcadlang_numerics::rng::Stream;
-use pcadlang_scene::render::{Camera, Frame, View};
+use pcadlang_scene::render::{Camera, Channel, Frame, View};
 use pcadlang_scene::vision::chamfer::{self, Mode};
 use pcadlang_scene::vision::contour_ratio;
 use pcadlang_scene::vision::{
     Chamfer, ChamferOptions, ContourRatio, ContourRatioOptions, DepthLikelihood, DepthMap,
-    DepthTally, MaskLikelihood, VisionError,
+    DepthTally, MaskLikelihood,
 };
 use std::cell::{OnceCell, RefCell};
-use std::sync::Arc;
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
 pub(super) const SECTION: &str = "Comparing";
 pub(super) const SEEN: Arg = arg("view", VIEW, "The view.");
 pub(super) const SIZE: Arg =
-    opt("size", Type::Int, "128", "The longer side of the rendered picture, 8 to 4096.")
-        .unit("pixels");
+    int("size", 128, [8, 4096], "The longer side of the rendered picture.").unit("pixels");
+
+const RATIO: ContourRatioOptions = ContourRatioOptions::USUAL;
 
 pub(super) const TABLE: &[Row] = &[
     incremental(
@@ -34,18 +35,13 @@ pub(super) const TABLE: &[Row] = &[
         &[
             SEEN,
             SIZE,
-            opt("foreground", Type::Num, "0.75", "The fraction of rendered contour that produces an observed edge."),
-            opt("sd", Type::Num, "0.4", "The standard deviation of its distance to that edge.")
+            num("foreground", RATIO.foreground, "The fraction of rendered contour that produces an observed edge."),
+            num("sd", RATIO.sd, "The standard deviation of its distance to that edge.")
                 .unit("percent of the diagonal"),
-            opt("truncate", Type::Num, "3.3", "The distance beyond which an edge is not matched.")
+            num("truncate", RATIO.truncate, "The distance beyond which an edge is not matched.")
                 .unit("percent of the diagonal"),
-            opt("credit", Type::Num, "2", "The number of times that one observed edge can be matched."),
-            opt(
-                "weight",
-                Type::Num,
-                "0.5",
-                "The power of the likelihood ratio per two pixels of contour, in a picture of 256 pixels.",
-            ),
+            num("credit", RATIO.credit, "The number of times that one observed edge can be matched."),
+            num("weight", RATIO.weight, "The power of the likelihood ratio per two pixels of contour, in a picture of 256 pixels."),
         ],
         Type::Likelihood,
         "The likelihood ratio of the observed contours: object against clutter. The default for photographs.",
@@ -57,14 +53,9 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             SEEN,
-            opt("sigma", Type::Num, "0.4", "The standard deviation of the distance.").unit("percent of the diagonal"),
-            opt(
-                "mode",
-                Type::Str,
-                "\"mean\"",
-                "\"mean\": one term for the mean distance, as in the paper; \"sum\": one term per percent of contour.",
-            ),
-            opt("symmetric", Type::Bool, "false", "Also measures from the observed to the rendered contours."),
+            num("sigma", ChamferOptions::USUAL.sigma, "The standard deviation of the distance.").positive().unit("percent of the diagonal"),
+            word("mode", &["mean", "sum"], "\"mean\": one term for the mean distance, as in the paper; \"sum\": one term per percent of contour."),
+            flag("symmetric", "Also measures from the observed to the rendered contours."),
             opt("truncate", Type::Num, "none", "Truncates distances at this value.").unit("percent of the diagonal"),
             opt("oriented", Type::Num, "none", "The distance equivalent to an orientation difference of one radian.")
                 .unit("percent of the diagonal"),
@@ -85,18 +76,18 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             SEEN,
-            opt("eps_in", Type::Num, "0.05", "The probability that an object pixel is observed as background."),
-            opt("eps_out", Type::Num, "0.05", "The probability that a background pixel is observed as object."),
+            num("eps_in", 0.05, "The probability that an object pixel is observed as background."),
+            num("eps_out", 0.05, "The probability that a background pixel is observed as object."),
             SIZE,
-            opt("partial", Type::Bool, "false", "Whether pixels that the object covers in part count in part. The score is then nearly continuous, as Hamiltonian kernels need it."),
+            flag("partial", "Whether pixels that the object covers in part count in part. The score is then nearly continuous, as Hamiltonian kernels need it."),
         ],
         Type::Likelihood,
         "The probability of an observed mask: pixels flip independently.",
         |a| {
-            let (eps_in, eps_out) = (a.num_or(1, 0.05)?, a.num_or(2, 0.05)?);
-            let partial = a.bool_or(4, false)?;
-            let (view, size) = (view(a)?, size(a, 3)?);
-            likelihood(MaskOf { view, size, eps: [eps_in, eps_out], partial })
+            let (eps, partial) = ([a.num("eps_in")?, a.num("eps_out")?], a.bool("partial")?);
+            let channel = if partial { Channel::Fractions } else { Channel::Depth };
+            let (view, size) = reading(a, channel)?;
+            likelihood(MaskOf { view, size, eps, partial })
         },
     )
     .vjp(|_, _, by| Some(by_view(by.clone(), 4))),
@@ -105,20 +96,19 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             SEEN,
-            opt("sd", Type::Num, "0.05", "The standard deviation of measured depths.").unit("scene units"),
-            opt("outlier", Type::Num, "0.05", "The fraction of outliers."),
-            opt("near", Type::Num, "0", "The minimum depth of an outlier.").unit("scene units"),
-            opt("far", Type::Num, "100", "The maximum depth of an outlier.").unit("scene units"),
+            num("sd", 0.05, "The standard deviation of measured depths.").positive().unit("scene units"),
+            num("outlier", 0.05, "The fraction of outliers."),
+            num("near", 0.0, "The minimum depth of an outlier.").unit("scene units"),
+            num("far", 100.0, "The maximum depth of an outlier.").unit("scene units"),
             SIZE,
         ],
         Type::Likelihood,
         "The density of an observed depth map: normal about the rendered depth, with outliers; \
          missing pixels are ignored.",
         |a, previous| {
-            let options = [a.positive_or(1, 0.05)?, a.num_or(2, 0.05)?, a.num_or(3, 0.0)?, a.num_or(4, 100.0)?];
-            let tally = SharedTally::after(previous);
-            let value = likelihood(DepthOf { view: view(a)?, size: size(a, 5)?, options, tally: Arc::clone(&tally) })?;
-            Ok((value, tally))
+            let options = [a.num("sd")?, a.num("outlier")?, a.num("near")?, a.num("far")?];
+            let (view, size) = reading(a, Channel::Depth)?;
+            tallying(previous, |tally| DepthOf { view, size, options, tally })
         },
     )
     .vjp(|_, _, by| Some(by_view(by.clone(), 5))),
@@ -137,54 +127,96 @@ pub(super) fn view(a: &Args) -> Result<Arc<View>, Fault> {
     a.object::<ViewValue>(0, "a view").map(|v| Arc::clone(&v.0))
 }
 
-pub(super) fn size(a: &Args, i: usize) -> Result<u32, Fault> {
-    if a.given(i) { a.int_in(i, 8, 4096).map(|n| n as u32) } else { Ok(128) }
+/// The view and the size of the picture that a comparator reads a channel of.
+pub(super) fn reading(a: &Args, channel: Channel) -> Result<(Arc<View>, u32), Fault> {
+    let (view, size) = (view(a)?, a.int("size")?);
+    view.declare(channel, size);
+    Ok((view, size))
 }
 
-fn optional(a: &Args, i: usize) -> Result<Option<f64>, Fault> {
-    if a.given(i) { a.num(i).map(Some) } else { Ok(None) }
+/// Sums over the contours that stay, of the comparator that counted them last. Likelihoods
+/// of one node of a trace share them, as their views share a canvas.
+pub(super) struct SharedTally<C, T>(Mutex<(Option<Arc<C>>, T)>);
+
+impl<C, T> fmt::Debug for SharedTally<C, T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("SharedTally")
+    }
+}
+
+impl<C: Send + Sync + 'static, T: Default + Send + 'static> SharedTally<C, T> {
+    /// The sums of the previous evaluation; new ones while another thread counts: forks that
+    /// run side by side would disturb each other.
+    pub fn after(previous: Option<&PreviousEvaluation>) -> Arc<SharedTally<C, T>> {
+        let kept = previous.and_then(|p| Arc::clone(&p.state).downcast::<SharedTally<C, T>>().ok());
+        kept.filter(|kept| !matches!(kept.0.try_lock(), Err(TryLockError::WouldBlock)))
+            .unwrap_or_else(|| Arc::new(SharedTally(Mutex::default())))
+    }
+
+    /// Calls a function with the sums of a comparator, empty ones if they were of another
+    /// one.
+    pub fn with<R>(&self, comparator: &Arc<C>, f: impl FnOnce(&mut T) -> R) -> R {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if !kept.0.as_ref().is_some_and(|of| Arc::ptr_eq(of, comparator)) {
+            *kept = (Some(Arc::clone(comparator)), T::default());
+        }
+        f(&mut kept.1)
+    }
+}
+
+/// A likelihood that shares the sums of the previous evaluation.
+pub(super) fn tallying<C, T, L: Likelihood + 'static>(
+    previous: Option<&PreviousEvaluation>,
+    make: impl FnOnce(Arc<SharedTally<C, T>>) -> L,
+) -> Result<(Value, State), Fault>
+where
+    C: Send + Sync + 'static,
+    T: Default + Send + 'static,
+{
+    let tally = SharedTally::after(previous);
+    Ok((likelihood(make(Arc::clone(&tally)))?, tally))
+}
+
+/// The fault of an observation that a comparator cannot use.
+pub(super) fn unsuitable<E: fmt::Display>(comparator: &str) -> impl Fn(E) -> Fault {
+    move |e| Fault::type_error(format!("{comparator}: {e}"))
+}
+
+/// Returns the observation, if it is of the type that a comparator takes.
+pub(super) fn observation<'a, T: Object>(
+    observed: &'a Value,
+    comparator: &str,
+    wanted: &str,
+) -> Result<&'a T, Fault> {
+    observed.downcast::<T>().ok_or_else(|| {
+        let got = observed.type_name();
+        Fault::type_error(format!("{comparator}: the observed value must be {wanted}, got {got}"))
+    })
 }
 
 fn contour(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, State), Fault> {
-    let d = ContourRatioOptions::default();
     let options = ContourRatioOptions {
-        foreground: a.num_or(2, d.foreground)?,
-        sd: a.num_or(3, d.sd)?,
-        truncate: a.num_or(4, d.truncate)?,
-        credit: a.num_or(5, d.credit)?,
-        weight: a.num_or(6, d.weight)?,
-        ..d
+        foreground: a.num("foreground")?,
+        sd: a.num("sd")?,
+        truncate: a.num("truncate")?,
+        credit: a.num("credit")?,
+        weight: a.num("weight")?,
+        ..RATIO
     };
-    let tally = SharedTally::after(previous);
-    let value = likelihood(ContourOf {
-        view: view(a)?,
-        size: size(a, 1)?,
-        options,
-        tally: Arc::clone(&tally),
-    })?;
-    Ok((value, tally))
+    let (view, size) = reading(a, Channel::Contours)?;
+    tallying(previous, |tally| ContourOf { view, size, options, tally })
 }
 
 fn chamfer(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, State), Fault> {
-    let mode = match a.choice(2, &["mean", "sum"])? {
-        "sum" => Mode::Sum,
-        _ => Mode::Mean,
-    };
     let options = ChamferOptions {
-        sigma: a.positive_or(1, ChamferOptions::default().sigma)?,
-        mode,
-        symmetric: a.bool_or(3, false)?,
-        truncate: optional(a, 4)?,
-        oriented: optional(a, 5)?,
+        sigma: a.num("sigma")?,
+        mode: if a.word("mode")? == "sum" { Mode::Sum } else { Mode::Mean },
+        symmetric: a.bool("symmetric")?,
+        truncate: a.num_if_given("truncate")?,
+        oriented: a.num_if_given("oriented")?,
     };
-    let tally = SharedTally::after(previous);
-    let value = likelihood(ChamferOf {
-        view: view(a)?,
-        size: size(a, 6)?,
-        options,
-        tally: Arc::clone(&tally),
-    })?;
-    Ok((value, tally))
+    let (view, size) = reading(a, Channel::Contours)?;
+    tallying(previous, |tally| ChamferOf { view, size, options, tally })
 }
 
 /// The adjoints of a likelihood's arguments: `by` for the view, unknown for `others`
@@ -207,32 +239,27 @@ pub(crate) fn by_silhouette(view: &View, size: u32, gains: &[f64]) -> Adjoint {
 pub(super) fn image<'a>(
     observed: &'a Value,
     view: &View,
-    what: &str,
-) -> Result<&'a ImageValue, String> {
-    let Some(image) = observed.downcast::<ImageValue>() else {
-        return Err(format!(
-            "{what}: the observed value must be an image, got {}",
-            observed.type_name()
-        ));
-    };
-    same_shape(image.size(), view, what)?;
+    comparator: &str,
+) -> Result<&'a ImageValue, Fault> {
+    let image: &ImageValue = observation(observed, comparator, "an image")?;
+    same_shape(image.size(), view, comparator)?;
     Ok(image)
 }
 
-pub(super) fn same_shape((w, h): (u32, u32), view: &View, what: &str) -> Result<(), String> {
+pub(super) fn same_shape((w, h): (u32, u32), view: &View, comparator: &str) -> Result<(), Fault> {
     let (cw, ch) = (view.camera().width, view.camera().height);
     let (a, b) = (f64::from(w) * f64::from(ch), f64::from(h) * f64::from(cw));
     if (a - b).abs() > 0.03 * a.max(b) {
-        return Err(format!(
-            "{what}: the observed picture has {w} x {h} pixels, but the camera's has {cw} x {ch}: \
-             the aspect ratios differ"
-        ));
+        return Err(Fault::type_error(format!(
+            "{comparator}: the observed picture has {w} x {h} pixels, but the camera's has {cw} x \
+             {ch}: the aspect ratios differ"
+        )));
     }
     Ok(())
 }
 
 thread_local! {
-    static RATIO: RefCell<contour_ratio::Scratch> = RefCell::default();
+    static RATIO_SCRATCH: RefCell<contour_ratio::Scratch> = RefCell::default();
     static CHAMFER: RefCell<chamfer::Scratch> = RefCell::default();
 }
 
@@ -246,12 +273,11 @@ struct ContourOf {
 
 impl ContourOf {
     /// Returns the comparator for the observed image at the rendered size.
-    fn prepared(&self, observed: &Value) -> Result<Arc<ContourRatio>, String> {
+    fn prepared(&self, observed: &Value) -> Result<Arc<ContourRatio>, Fault> {
         let image = image(observed, &self.view, self.name())?;
-        let camera = self.view.camera().scaled_to(self.size);
-        image.ratios.get((self.options.clone(), camera.width, camera.height), |(options, w, h)| {
-            ContourRatio::prepare(image.map()?, *w, *h, options)
-                .map_err(|e| format!("scene.contour: {e}"))
+        let Camera { width, height, .. } = self.view.camera().scaled_to(self.size);
+        image.prepared.get((self.options.clone(), width, height), |(options, w, h)| {
+            ContourRatio::prepare(image.map()?, *w, *h, options).map_err(unsuitable(self.name()))
         })
     }
 }
@@ -261,7 +287,7 @@ impl Likelihood for ContourOf {
         "scene.contour"
     }
 
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+    fn log_density(&self, observed: &Value) -> Result<f64, Fault> {
         let (ratio, change) = (self.prepared(observed)?, self.view.change(self.size));
         let whole = OnceCell::new();
         let whole = || whole.get_or_init(|| self.view.contours(self.size)).slice();
@@ -272,7 +298,8 @@ impl Likelihood for ContourOf {
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (ratio, contours) = (self.prepared(observed).ok()?, self.view.contours(self.size));
         let mut by_piece = Vec::new();
-        RATIO.with_borrow_mut(|scratch| ratio.gradient(&contours.slice(), scratch, &mut by_piece));
+        RATIO_SCRATCH
+            .with_borrow_mut(|scratch| ratio.gradient(&contours.slice(), scratch, &mut by_piece));
         Some(by_contours(&self.view, self.size, &by_piece))
     }
 
@@ -297,16 +324,12 @@ struct ChamferOf {
 
 impl ChamferOf {
     /// Returns the comparator for the observed image at the rendered size.
-    fn prepared(&self, observed: &Value) -> Result<Arc<Chamfer>, String> {
+    fn prepared(&self, observed: &Value) -> Result<Arc<Chamfer>, Fault> {
         let image = image(observed, &self.view, self.name())?;
-        let camera = self.view.camera().scaled_to(self.size);
-        image.chamfers.get(
-            (self.options.clone(), camera.width, camera.height),
-            |(options, w, h)| {
-                Chamfer::prepare(image.map()?, *w, *h, options)
-                    .map_err(|e| format!("scene.chamfer: {e}"))
-            },
-        )
+        let Camera { width, height, .. } = self.view.camera().scaled_to(self.size);
+        image.prepared.get((self.options.clone(), width, height), |(options, w, h)| {
+            Chamfer::prepare(image.map()?, *w, *h, options).map_err(unsuitable(self.name()))
+        })
     }
 }
 
@@ -315,7 +338,7 @@ impl Likelihood for ChamferOf {
         "scene.chamfer"
     }
 
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+    fn log_density(&self, observed: &Value) -> Result<f64, Fault> {
         let (chamfer, change) = (self.prepared(observed)?, self.view.change(self.size));
         let whole = OnceCell::new();
         let whole = || whole.get_or_init(|| self.view.contours(self.size)).slice();
@@ -364,25 +387,19 @@ struct MaskOf {
     view: Arc<View>,
     size: u32,
     eps: [f64; 2],
-    /// Whether pixels are covered in part.
+    /// Pixels may be covered in part.
     partial: bool,
 }
 
 impl MaskOf {
     /// Returns the observed mask, prepared at the rendered size.
-    fn prepared(&self, observed: &Value) -> Result<Arc<MaskLikelihood>, String> {
-        let Some(mask) = observed.downcast::<MaskValue>() else {
-            return Err(format!(
-                "scene.mask: the observed value must be a mask, got {}",
-                observed.type_name()
-            ));
-        };
-        same_shape((mask.mask.width(), mask.mask.height()), &self.view, self.name())?;
+    fn prepared(&self, observed: &Value) -> Result<Arc<MaskLikelihood>, Fault> {
+        let MaskValue { mask, prepared } = observation(observed, self.name(), "a mask")?;
+        same_shape((mask.width(), mask.height()), &self.view, self.name())?;
         let Camera { width, height, .. } = self.view.camera().scaled_to(self.size);
-        mask.prepared.get((self.eps, width, height), |([i, o], w, h)| {
-            MaskLikelihood::new(&mask.mask, *i, *o)
-                .map(|l| l.resized(*w, *h))
-                .map_err(|e| format!("scene.mask: {e}"))
+        prepared.get((self.eps, width, height), |([i, o], w, h)| {
+            let whole = MaskLikelihood::new(mask, *i, *o).map_err(unsuitable(self.name()))?;
+            Ok(whole.resized(*w, *h))
         })
     }
 
@@ -400,7 +417,7 @@ impl Likelihood for MaskOf {
         vec![drawn(self.size)]
     }
 
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+    fn log_density(&self, observed: &Value) -> Result<f64, Fault> {
         let prepared = self.prepared(observed)?;
         let (width, height) = (prepared.observed().width(), prepared.observed().height());
         match self.partial {
@@ -410,17 +427,17 @@ impl Likelihood for MaskOf {
             }
             false => prepared.log_likelihood(&self.rendered(), width, height),
         }
-        .map_err(|e| format!("scene.mask: {e}"))
+        .map_err(unsuitable(self.name()))
     }
 
     /// Draws a mask of the rendered size.
-    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
+    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, Fault>> {
         let draw = |prepared: Arc<MaskLikelihood>| {
             let drawn = match self.partial {
                 true => prepared.simulate_coverage(&self.view.fractions(self.size), rng),
                 false => prepared.simulate(&self.rendered(), rng),
             };
-            let drawn = drawn.map_err(|e| format!("scene.mask: {e}"))?;
+            let drawn = drawn.map_err(unsuitable(self.name()))?;
             Ok(Value::object(MaskValue::new(drawn)))
         };
         Some(self.prepared(observed).and_then(draw))
@@ -453,22 +470,15 @@ struct DepthOf {
 impl DepthOf {
     /// Returns the observed depths, prepared at the rendered size, and the rendered
     /// frame.
-    fn prepared(&self, observed: &Value) -> Result<(Arc<DepthLikelihood>, Arc<Frame>), String> {
-        let Some(depth) = observed.downcast::<DepthValue>() else {
-            return Err(format!(
-                "scene.depth: the observed value must be a depth map, got {}",
-                observed.type_name()
-            ));
-        };
-        same_shape((depth.depth.width(), depth.depth.height()), &self.view, "scene.depth")?;
+    fn prepared(&self, observed: &Value) -> Result<(Arc<DepthLikelihood>, Arc<Frame>), Fault> {
+        let DepthValue { depth, prepared } = observation(observed, self.name(), "a depth map")?;
+        same_shape((depth.width(), depth.height()), &self.view, self.name())?;
         let frame = self.view.depth(self.size);
-        let prepared = depth.prepared.get(
-            (self.options, frame.width, frame.height),
-            |([sd, outlier, near, far], w, h)| {
-                let whole = DepthLikelihood::new(&depth.depth, *sd, *outlier, (*near, *far));
-                whole.map(|l| l.resized(*w, *h)).map_err(|e| format!("scene.depth: {e}"))
-            },
-        )?;
+        let key = (self.options, frame.width, frame.height);
+        let prepared = prepared.get(key, |([sd, outlier, near, far], w, h)| {
+            let whole = DepthLikelihood::new(depth, *sd, *outlier, (*near, *far));
+            Ok(whole.map_err(unsuitable(self.name()))?.resized(*w, *h))
+        })?;
         Ok((prepared, frame))
     }
 }
@@ -482,23 +492,23 @@ impl Likelihood for DepthOf {
         vec![drawn(self.size)]
     }
 
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+    fn log_density(&self, observed: &Value) -> Result<f64, Fault> {
         let (prepared, frame) = self.prepared(observed)?;
         let Frame { depth, width, height, .. } = &*frame;
         self.tally
             .with(&prepared, |tally| prepared.log_likelihood_after(depth, *width, *height, tally))
-            .map_err(|e| format!("scene.depth: {e}"))
+            .map_err(unsuitable(self.name()))
     }
 
     /// Draws a depth map of the rendered size; pixels missing in the observed one stay
     /// missing.
-    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
-        let wrong = |e: VisionError| format!("scene.depth: {e}");
+    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, Fault>> {
+        let wrong = unsuitable(self.name());
         let draw = |(prepared, frame): (Arc<DepthLikelihood>, Arc<Frame>)| {
-            let mut drawn = prepared.simulate(&frame.depth, rng).map_err(wrong)?;
+            let mut drawn = prepared.simulate(&frame.depth, rng).map_err(&wrong)?;
             let missing = prepared.observed().data().iter().map(|d| d.is_nan());
             drawn.iter_mut().zip(missing).filter(|(_, m)| *m).for_each(|(d, _)| *d = f32::NAN);
-            let map = DepthMap::new(frame.width, frame.height, drawn).map_err(wrong)?;
+            let map = DepthMap::new(frame.width, frame.height, drawn).map_err(&wrong)?;
             Ok(Value::object(DepthValue::new(map)))
         };
         Some(self.prepared(observed).and_then(draw))

@@ -6,7 +6,8 @@ use super::compare::{SECTION, SEEN, by_view, likelihood, view};
 use super::native;
 use glam::DVec3;
 use pcadlang_engine::lang::adjoint::Adjoint;
-use pcadlang_engine::lang::builtins::{Row, Type, arg, opt};
+use pcadlang_engine::lang::builtins::{Row, Type, arg, num};
+use pcadlang_engine::lang::error::Fault;
 use pcadlang_engine::lang::value::{Likelihood, Value};
 use pcadlang_numerics::rng::Stream;
 use pcadlang_scene::geom::Landmark;
@@ -20,28 +21,29 @@ pub(super) const TABLE: &[Row] = &[native(
     &[
         SEEN,
         arg("scale", Type::Num, "The length of a metre: the scale of the body.")
+            .positive()
             .unit("scene units"),
-        opt(
+        num(
             "share",
-            Type::Num,
-            "1",
+            1.0,
             "The fraction of the true depth that the network reports: \
                                       from a single picture it underestimates depth.",
-        ),
-        opt("sd", Type::Num, "0.1", "The standard deviation of an inlier depth.").unit("metres"),
-        opt("outlier", Type::Num, "0.05", "The fraction of outliers."),
+        )
+        .positive(),
+        num("sd", 0.1, "The standard deviation of an inlier depth.").positive().unit("metres"),
+        num("outlier", 0.05, "The fraction of outliers."),
     ],
     Type::Likelihood,
     "The density of landmark depths relative to the mid-hip, as estimated by a network from a \
      single picture: the third number of each point [right, down, away] in a record, in metres, \
      such as `metres` of `scene.people`. Names that the scene lacks are ignored.",
     |a| {
-        let (sd, outlier) = (a.positive_or(3, 0.1)?, a.num_or(4, 0.05)?);
+        let (sd, outlier) = (a.num("sd")?, a.num("outlier")?);
         let model = RelativeDepthLikelihood::new(sd, outlier).map_err(|_| match sd < 1e9 {
-            true => a.outside(4, "strictly between 0 and 1"),
-            false => a.outside(3, "less than 1e9"),
+            true => a.outside("outlier", "strictly between 0 and 1"),
+            false => a.outside("sd", "less than 1e9"),
         })?;
-        let (scale, share) = (a.positive_or(1, 1.0)?, a.positive_or(2, 1.0)?);
+        let (scale, share) = (a.num("scale")?, a.num("share")?);
         likelihood(RelativeDepthOf { view: view(a)?, scale, share, model })
     },
 )
@@ -73,21 +75,22 @@ struct Term<'a> {
 
 impl RelativeDepthOf {
     /// Returns the indices of the two hip landmarks.
-    fn hips(&self, landmarks: &[Landmark]) -> Result<[usize; 2], String> {
+    fn hips(&self, landmarks: &[Landmark]) -> Result<[usize; 2], Fault> {
         let find = |name: &str| landmarks.iter().position(|l| &*l.name == name);
         find("l_hip").zip(find("r_hip")).map(|(l, r)| [l, r]).ok_or_else(|| {
-            "scene.relative_depth: depths are relative to the mid-hip, but the scene has no \
-             landmarks `l_hip` and `r_hip`"
-                .into()
+            Fault::type_error(
+                "scene.relative_depth: depths are relative to the mid-hip, but the scene has no \
+                 landmarks `l_hip` and `r_hip`",
+            )
         })
     }
 
-    fn each<'a>(&self, observed: &'a Value, mut f: impl FnMut(Term<'a>)) -> Result<(), String> {
+    fn each<'a>(&self, observed: &'a Value, mut f: impl FnMut(Term<'a>)) -> Result<(), Fault> {
         let Value::Record(points) = observed else {
-            return Err(format!(
+            return Err(Fault::type_error(format!(
                 "scene.relative_depth: the observed value must be a record of points [right, down, away], got {}",
                 observed.type_name()
-            ));
+            )));
         };
         let landmarks = self.view.solid().landmarks();
         let hips = self.hips(landmarks)?;
@@ -99,10 +102,10 @@ impl RelativeDepthOf {
             let point = match point {
                 Value::Array(p) if p.len() == 3 && p.iter().all(|x| x.is_finite()) => p,
                 other => {
-                    return Err(format!(
+                    return Err(Fault::type_error(format!(
                         "scene.relative_depth: `{name}` must be three numbers [right, down, away], got {}",
                         other.type_name()
-                    ));
+                    )));
                 }
             };
             let Some(landmark) = landmarks.iter().position(|l| l.name == *name) else { continue };
@@ -118,7 +121,7 @@ impl Likelihood for RelativeDepthOf {
         "scene.relative_depth"
     }
 
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+    fn log_density(&self, observed: &Value) -> Result<f64, Fault> {
         let mut sum = 0.0;
         self.each(observed, |t| sum += self.model.log_density(t.point[2], t.depth))?;
         Ok(sum)
@@ -126,7 +129,7 @@ impl Likelihood for RelativeDepthOf {
 
     /// Draws depths of the landmarks in the scene; the other landmarks, and the numbers
     /// to the right and down, stay as observed.
-    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
+    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, Fault>> {
         let Value::Record(points) = observed else { return None };
         let mut drawn = (**points).clone();
         let each = self.each(observed, |t| {

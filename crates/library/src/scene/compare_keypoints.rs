@@ -5,12 +5,16 @@
 //! pixels of the picture in which the joints were detected.
 
 use super::adjoints::BySolid;
-use super::compare::{SECTION, SEEN, by_view, likelihood, same_shape, view};
+use super::compare::{
+    SECTION, SEEN, by_view, likelihood, observation, same_shape, unsuitable, view,
+};
 use super::observed::KeypointsValue;
 use super::{ViewValue, incremental};
 use glam::DVec3;
 use pcadlang_engine::lang::adjoint::Adjoint;
-use pcadlang_engine::lang::builtins::{Args, PreviousEvaluation, Row, State, Type, opt};
+use pcadlang_engine::lang::builtins::{
+    Args, Default, Domain, PreviousEvaluation, Row, State, Type, arg, flag, num, word,
+};
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_engine::lang::value::{Likelihood, Located, Value};
 use pcadlang_numerics::rng::Stream;
@@ -27,55 +31,47 @@ pub(super) const TABLE: &[Row] = &[incremental(
     SECTION,
     &[
         SEEN,
-        opt(
+        arg(
             "sd",
             Type::Any,
-            "1.5",
             "The standard deviation of an inlier detection along each axis: a number, or a record \
              of numbers by joint, with `other` for the rest.",
         )
+        .or(Default::Num(1.5))
+        .positive()
         .unit("percent of the diagonal"),
-        opt(
-            "outlier",
-            Type::Num,
-            "0.05",
-            "The fraction of outliers among detections of full confidence.",
-        ),
-        opt(
+        num("outlier", 0.05, "The fraction of outliers among detections of full confidence.")
+            .within(Domain::Between01),
+        num(
             "offset",
-            Type::Num,
-            "0",
+            0.0,
             "The standard deviation of a joint about its position in \
                                        the scene, along each axis, since bodies differ.",
         )
+        .within(Domain::NotNegative)
         .unit("percent of the diagonal"),
-        opt(
+        word(
             "unit",
-            Type::Str,
-            "\"diagonal\"",
+            &["diagonal", "torso"],
             "The unit of `sd`, `offset` and `systematic`: \"diagonal\", percent of the picture's \
              diagonal; \"torso\", lengths of the detected torso.",
         ),
-        opt(
-            "confidence",
-            Type::Bool,
-            "true",
-            "Whether detections of low confidence are more often outliers.",
-        ),
-        opt(
+        flag("confidence", "Whether detections of low confidence are more often outliers.")
+            .or(Default::Bool(true)),
+        num(
             "misses",
-            Type::Num,
-            "0",
+            0.0,
             "The fraction of joints whose position in the scene is \
                                        further off, with 8 times the standard deviation.",
-        ),
-        opt(
+        )
+        .within(Domain::Below1),
+        num(
             "systematic",
-            Type::Num,
-            "0",
+            0.0,
             "The standard deviation of the error common to detector and scene: it widens the \
              reported uncertainty of joints, not the density.",
         )
+        .within(Domain::NotNegative)
         .unit("percent of the diagonal"),
     ],
     Type::Likelihood,
@@ -86,31 +82,21 @@ pub(super) const TABLE: &[Row] = &[incremental(
 .vjp(|_, _, by| Some(by_view(by.clone(), 7)))];
 
 fn keypoints(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, State), Fault> {
-    let (outlier, offset, misses) = (a.num_or(2, 0.05)?, a.num_or(3, 0.0)?, a.num_or(6, 0.0)?);
-    let systematic = a.num_or(7, 0.0)?;
-    let unit = match a.choice(4, &["diagonal", "torso"])? {
-        "torso" => Unit::Torso,
-        _ => Unit::Diagonal,
-    };
+    let unit = if a.word("unit")? == "torso" { Unit::Torso } else { Unit::Diagonal };
     let (sd, by_joint) = spreads(a)?;
-    let options = KeypointOptions { sd, outlier, offset, unit, misses, systematic };
-    if !(options.outlier > 0.0 && options.outlier < 1.0) {
-        return Err(a.outside(2, "strictly between 0 and 1"));
-    }
-    if !(options.offset >= 0.0 && options.offset.is_finite()) {
-        return Err(a.outside(3, "not negative and finite"));
-    }
-    if !(0.0..1.0).contains(&options.misses) {
-        return Err(a.outside(6, "from 0 to less than 1"));
-    }
-    if !(options.systematic >= 0.0 && options.systematic.is_finite()) {
-        return Err(a.outside(7, "not negative and finite"));
-    }
+    let options = KeypointOptions {
+        sd,
+        outlier: a.num("outlier")?,
+        offset: a.num("offset")?,
+        unit,
+        misses: a.num("misses")?,
+        systematic: a.num("systematic")?,
+    };
     let kept = previous.and_then(|p| Arc::clone(&p.state).downcast::<Kept>().ok());
     let kept = kept.unwrap_or_default();
     let value = likelihood(KeypointsOf {
         view: view(a)?,
-        model: Model { options, by_joint, confident: a.bool_or(5, true)? },
+        model: Model { options, by_joint, confident: a.bool("confidence")? },
         kept: Arc::clone(&kept),
     })?;
     Ok((value, kept))
@@ -128,11 +114,11 @@ struct KeypointsOf {
 struct Model {
     options: KeypointOptions,
     by_joint: ByJoint,
-    /// Whether the confidence of detections is used.
+    /// The confidence of detections is used.
     confident: bool,
 }
 
-/// What the likelihoods of one node of a trace share: the detections with their landmarks
+/// Shared by the likelihoods of one node of a trace: the detections with their landmarks
 /// and models, which stay the same while the scene moves.
 type Kept = Mutex<Option<Arc<Matched>>>;
 
@@ -167,10 +153,10 @@ type ByJoint = Vec<(Arc<str>, f64)>;
 
 /// Reads the default standard deviation, and those of individual joints.
 fn spreads(a: &Args) -> Result<(f64, ByJoint), Fault> {
-    let Value::Record(record) = a.get(1) else { return Ok((a.positive_or(1, 1.5)?, Vec::new())) };
+    let Value::Record(record) = a.get("sd") else { return Ok((a.num("sd")?, Vec::new())) };
     let positive = |v: &Value| match v {
         Value::Num(x) if *x > 0.0 && x.is_finite() => Ok(*x),
-        v => Err(a.element_wrong(1, "a positive number, or a record of them with `other`", v)),
+        v => Err(a.element_wrong("sd", "a positive number, or a record of them with `other`", v)),
     };
     let Some(other) = record.get("other") else {
         return Err(Fault::type_error(
@@ -214,7 +200,7 @@ impl Likelihood for KeypointsOf {
         "scene.keypoints"
     }
 
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+    fn log_density(&self, observed: &Value) -> Result<f64, Fault> {
         let mut sum = 0.0;
         self.each(observed, |term| {
             sum += term.model.log_density_with(term.constants, term.seen, term.joint)
@@ -224,7 +210,7 @@ impl Likelihood for KeypointsOf {
 
     /// Draws positions for the detected joints, with the same confidence. A detection
     /// without a landmark in the scene stays as observed.
-    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
+    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, Fault>> {
         let KeypointsValue(seen) = observed.downcast::<KeypointsValue>()?;
         let mut points = seen.points().to_vec();
         let mut torso = 0.0;
@@ -310,7 +296,7 @@ struct Term<'a> {
 
 impl KeypointsOf {
     /// Calls a function for each detection whose landmark the scene has.
-    fn each(&self, observed: &Value, mut f: impl FnMut(Term)) -> Result<(), String> {
+    fn each(&self, observed: &Value, mut f: impl FnMut(Term)) -> Result<(), Fault> {
         let (camera, landmarks) = (self.view.camera(), self.view.solid().landmarks());
         let matched = self.matched(observed)?;
         let size = matched.size;
@@ -335,7 +321,7 @@ impl KeypointsOf {
 
     /// The detections with their landmarks, from the last evaluation if nothing but the
     /// positions of the landmarks has changed.
-    fn matched(&self, observed: &Value) -> Result<Arc<Matched>, String> {
+    fn matched(&self, observed: &Value) -> Result<Arc<Matched>, Fault> {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let (camera, landmarks) = (self.view.camera(), self.view.solid().landmarks());
         let names = || landmarks.iter().map(|l| &l.name);
@@ -349,12 +335,7 @@ impl KeypointsOf {
         if let Some(matched) = kept.as_ref().filter(holds) {
             return Ok(Arc::clone(matched));
         }
-        let Some(KeypointsValue(seen)) = observed.downcast::<KeypointsValue>() else {
-            return Err(format!(
-                "scene.keypoints: the observed value must be keypoints, got {}",
-                observed.type_name()
-            ));
-        };
+        let KeypointsValue(seen) = observation(observed, self.name(), "keypoints")?;
         let size = seen.size().unwrap_or((camera.width, camera.height));
         let mut matched = Matched {
             observed: observed.clone(),
@@ -373,18 +354,18 @@ impl KeypointsOf {
         Ok(Arc::clone(kept.insert(Arc::new(matched))))
     }
 
-    fn terms(&self, seen: &Keypoints, matched: &Matched) -> Result<Vec<MatchedTerm>, String> {
+    fn terms(&self, seen: &Keypoints, matched: &Matched) -> Result<Vec<MatchedTerm>, Fault> {
         let Matched { size, torso, .. } = *matched;
         let names: Vec<&str> = matched.names.iter().map(|name| &**name).collect();
         let near =
             |name: &str, known: &[&str]| nearest(name, known.iter().copied()).map(str::to_owned);
-        let found = matching(seen, &names, near).map_err(|e| format!("scene.keypoints: {e}"))?;
+        let found = matching(seen, &names, near).map_err(unsuitable(self.name()))?;
         let whole = (f64::from(size.0), f64::from(size.1));
         let model = |sd: f64| {
             let options = KeypointOptions { sd, ..self.model.options.clone() };
             KeypointLikelihood::new(whole.0, whole.1, torso.max(1e-3), &options)
                 .map(Arc::new)
-                .map_err(|e| format!("scene.keypoints: {e}"))
+                .map_err(unsuitable(self.name()))
         };
         let usual = model(self.model.options.sd)?;
         let mut terms = Vec::with_capacity(found.len());

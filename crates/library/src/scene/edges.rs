@@ -2,8 +2,7 @@
 
 use super::observed::{DetectorSettings, DetectorValue};
 use super::{IMAGE, ImageValue, native};
-use pcadlang_engine::lang::builtins::{Row, Type, arg, opt};
-use pcadlang_engine::lang::error::{Fault, FaultKind};
+use pcadlang_engine::lang::builtins::{Domain, Row, Type, arg, int, num, opt};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::vision::MOST_MAP_SIZE;
 
@@ -12,29 +11,29 @@ pub(super) const TABLE: &[Row] = &[native(
     "Comparing",
     &[
         arg("image", IMAGE, "The photograph. A contour map is returned unchanged."),
-        opt(
+        int(
             "size",
-            Type::Int,
-            "256",
-            "The longer side of the picture that is analysed, 8 to 8192; with a detector from a \
+            256,
+            [8, 8192],
+            "The longer side of the picture that is analysed; with a detector from a \
              file 512, at most 2048, and ignored by a network of fixed size.",
         )
         .unit("pixels"),
-        opt(
+        num(
             "smooth",
-            Type::Num,
-            "1.6",
-            "The standard deviation of the smoothing, 0.3 to 32: larger values give fewer and \
+            1.6,
+            "The standard deviation of the smoothing: larger values give fewer and \
              longer contours. With a detector from a file it smooths the map, by 1.",
         )
+        .within(Domain::From([0.3, 32.0]))
         .unit("pixels"),
-        opt(
+        num(
             "strength",
-            Type::Num,
-            "0.4",
-            "The minimum strength of a contour point, 0 to 1: weaker points are more often \
+            0.4,
+            "The minimum strength of a contour point: weaker points are more often \
              texture than outline. 0.1 with a structured forest, 0.5 with a network.",
-        ),
+        )
+        .within(Domain::From([0.0, 1.0])),
         opt(
             "detector",
             Type::Object("a detector"),
@@ -52,28 +51,30 @@ pub(super) const TABLE: &[Row] = &[native(
             return Ok(Value::Unit);
         }
         let image = a.object::<ImageValue>(0, "an image")?;
-        let detector =
-            if a.given(4) { Some(a.object::<DetectorValue>(4, "a detector")?) } else { None };
+        let detector = match a.given("detector") {
+            true => Some(a.object::<DetectorValue>("detector", "a detector")?),
+            false => None,
+        };
         let (mut by, usual) = DetectorSettings::usual(detector);
         let (most, old_size, old_sigma) = match &by {
             DetectorSettings::Gradients(g) => (8192, g.size, g.sigma),
             DetectorSettings::File { size, sigma, .. } => (MOST_MAP_SIZE, *size, *sigma),
         };
-        let asked = if a.given(1) { a.int_in(1, 8, i64::from(most))? as u32 } else { old_size };
-        let smooth = a.num_or(2, f64::from(old_sigma))?;
-        let strength = a.num_or(3, f64::from(usual))?;
-        if !(0.3..=32.0).contains(&smooth) {
-            return Err(a.outside(2, "from 0.3 to 32"));
-        }
-        if !(0.0..=1.0).contains(&strength) {
-            return Err(a.outside(3, "from 0 to 1"));
-        }
+        // The defaults are those of the detector.
+        let number = |name: &str, usual: f32| match a.is_written(name) {
+            true => a.num(name),
+            false => Ok(f64::from(usual)),
+        };
+        let asked = match a.is_written("size") {
+            true => a.int_in("size", 8, i64::from(most))? as u32,
+            false => old_size,
+        };
+        let (smooth, strength) = (number("smooth", old_sigma)?, number("strength", usual)?);
         match &mut by {
             DetectorSettings::Gradients(g) => (g.size, g.sigma) = (asked, smooth as f32),
             DetectorSettings::File { size, sigma, .. } => (*size, *sigma) = (asked, smooth as f32),
         }
-        let found = image.detected_by(by, strength as f32);
-        let found = found.map_err(|e| Fault::new(FaultKind::Other, format!("scene.edges: {e}")))?;
+        let found = image.detected_by(by, strength as f32).map_err(|f| f.of("scene.edges"))?;
         Ok(found.unwrap_or_else(|| a.get(0).clone()))
     },
 )];
@@ -81,6 +82,7 @@ pub(super) const TABLE: &[Row] = &[native(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pcadlang_engine::lang::error::Fault;
     use pcadlang_scene::vision::{ContourMap, Photo};
 
     fn edges(image: &Value, more: &[f64]) -> Result<Value, Fault> {

@@ -2,16 +2,17 @@
 //! photograph, keypoints in its pixels, contours by the detector that a run chose.
 
 use super::{CameraValue, DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue};
+use crate::model::Program;
 use indexmap::IndexMap;
 use pcadlang_engine::lang::builtins::{Defaults, InputHook};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::render::Camera;
 
 /// The arguments that default to the run's camera.
-pub const CAMERAS: [(&str, &str); 2] = [("scene.render", "camera"), ("scene.candidates", "camera")];
+const CAMERAS: [(&str, &str); 2] = [("scene.render", "camera"), ("scene.candidates", "camera")];
 
 /// The argument that defaults to the run's contour detector.
-pub const DETECTOR_DEFAULT: (&str, &str) = ("scene.edges", "detector");
+const DETECTOR_DEFAULT: (&str, &str) = ("scene.edges", "detector");
 
 /// Prepares the inputs of programs.
 #[derive(Debug)]
@@ -63,5 +64,25 @@ fn default_camera(data: &mut IndexMap<String, Value>, defaults: &mut Defaults) {
         for of in CAMERAS {
             defaults.insert(owned(of), camera.clone());
         }
+    }
+}
+
+impl Program {
+    /// Sets the camera of views that do not specify one.
+    #[must_use]
+    pub fn camera(self, camera: Camera) -> Program {
+        CAMERAS.iter().fold(self, |p, (of, name)| {
+            p.default_argument(of, name, Value::object(CameraValue(camera)))
+        })
+    }
+
+    /// Sets the contour detector for photographs for which the program does not specify
+    /// one: a value as from `data d = detector("file");`, or one with `None` for the
+    /// built-in detector.
+    #[must_use]
+    #[doc(hidden)]
+    pub fn detector(self, detector: DetectorValue) -> Program {
+        let (of, name) = DETECTOR_DEFAULT;
+        self.default_argument(of, name, Value::object(detector))
     }
 }

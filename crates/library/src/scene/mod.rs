@@ -23,11 +23,9 @@ mod region;
 mod scene_view;
 mod seeing;
 mod shapes;
-mod shared_tally;
 
 pub use bodies::AUTORIG;
 pub use data::DETECTOR;
-pub use inputs::{CAMERAS, DETECTOR_DEFAULT};
 pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};
 pub use observed::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue};
 pub use scene_view::SceneView;

@@ -3,6 +3,7 @@
 use super::adjoints::BySolid;
 use glam::{DMat3, DVec3};
 use pcadlang_engine::lang::adjoint::Adjoint;
+use pcadlang_engine::lang::error::Fault;
 use pcadlang_engine::lang::index::xyz;
 use pcadlang_engine::lang::value::{Object, Value};
 use pcadlang_scene::geom::armature::Armature;
@@ -63,7 +64,7 @@ impl Object for AffineValue {
 
     /// Applies the placement to a solid, or composes it with a placement, of which the
     /// right one acts first.
-    fn multiply(&self, other: &Value) -> Option<Result<Value, String>> {
+    fn multiply(&self, other: &Value) -> Option<Result<Value, Fault>> {
         if let Some(s) = other.downcast::<SolidValue>() {
             return Some(Ok(Value::object(SolidValue(s.0.placed(self.0)))));
         }

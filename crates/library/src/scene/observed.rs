@@ -3,83 +3,82 @@
 //! cached with it.
 
 use pcadlang_detectors::people::Person;
+use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::{Object, Value};
-use pcadlang_scene::vision::candidates::{Candidate, CandidateOptions};
 use pcadlang_scene::vision::{
-    Chamfer, ChamferOptions, ContourDetector, ContourMap, ContourRatio, ContourRatioOptions,
-    DepthLikelihood, DepthMap, GradientDetector, Keypoints, MAP_SIZE, Mask, MaskLikelihood, Photo,
-    Region, RegionOptions, SoftMap,
+    ContourDetector, ContourMap, DepthMap, GradientDetector, Keypoints, MAP_SIZE, Mask, Photo,
+    SoftMap,
 };
 use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// The maximum number of cached items of a kind: options can be choices of the program,
+/// The maximum number of prepared items of a type: options can be choices of the program,
 /// such as the `sigma` of a chamfer distance.
 const MOST: usize = 32;
 
-/// A cache of prepared data, by their options.
-#[derive(Debug)]
-pub(super) struct Cache<K, T>(Mutex<Vec<(K, Arc<T>)>>);
+/// Data prepared from one observation, each item by its type and options.
+#[derive(Debug, Default)]
+pub(super) struct Prepared(Mutex<Vec<Box<dyn Any + Send + Sync>>>);
 
-impl<K, T> Default for Cache<K, T> {
-    fn default() -> Self {
-        Cache(Mutex::default())
-    }
-}
+/// One prepared item; threads that ask for it at once make it once.
+struct Item<K, T>(K, Arc<OnceLock<Result<Arc<T>, Fault>>>);
 
-impl<K: PartialEq, T> Cache<K, T> {
+impl Prepared {
     /// Returns the item for a key; makes it if it is new.
-    pub fn get(
+    pub fn get<K, T>(
         &self,
         key: K,
-        make: impl FnOnce(&K) -> Result<T, String>,
-    ) -> Result<Arc<T>, String> {
+        make: impl FnOnce(&K) -> Result<T, Fault>,
+    ) -> Result<Arc<T>, Fault>
+    where
+        K: PartialEq + Clone + Send + Sync + 'static,
+        T: Send + Sync + 'static,
+    {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, t)) = all.iter().find(|(k, _)| *k == key) {
-            return Ok(Arc::clone(t));
-        }
-        let made = Arc::new(make(&key)?);
-        if all.len() == MOST {
-            // Keeps the first item, which may be a simulated observation that cannot be
-            // remade.
-            all.remove(1);
-        }
-        all.push((key, Arc::clone(&made)));
-        Ok(made)
+        let mut known = all.iter().filter_map(|i| i.downcast_ref::<Item<K, T>>());
+        let item = match known.find(|i| i.0 == key) {
+            Some(item) => Arc::clone(&item.1),
+            None => {
+                let own = (0..all.len()).filter(|i| all[*i].is::<Item<K, T>>());
+                let own: Vec<usize> = own.collect();
+                if own.len() == MOST {
+                    // Keeps the first item, which may be a simulated observation that cannot
+                    // be remade.
+                    all.remove(own[1]);
+                }
+                let made = Arc::default();
+                all.push(Box::new(Item(key.clone(), Arc::clone(&made))));
+                made
+            }
+        };
+        // Making one item may need another one.
+        drop(all);
+        item.get_or_init(|| make(&key).map(Arc::new)).clone()
     }
 
-    /// Returns the item that was made first.
-    pub fn any(&self) -> Option<Arc<T>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).first().map(|(_, t)| Arc::clone(t))
+    /// Returns the item of a type that was made first.
+    pub fn first<K: 'static, T: 'static>(&self) -> Option<Arc<T>> {
+        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.iter().find_map(|i| i.downcast_ref::<Item<K, T>>())?.1.get()?.clone().ok()
     }
 }
 
-/// Options, and the width and height of the frame.
-type Key<O> = (O, u32, u32);
+/// The options of a search for people: the number of views, and the maximum number of people.
+pub(super) type PeopleKey = (u32, u32);
 
 /// A photograph, a ready-made contour map, or both.
 #[derive(Debug, Default)]
 pub struct ImageValue {
     photo: Option<Photo>,
     /// Its contours, given or detected on first use.
-    map: OnceLock<Result<ContourMap, String>>,
-    /// Whether the contours were given.
+    map: OnceLock<Result<ContourMap, Fault>>,
+    /// The contours were given.
     ready: bool,
     /// The detector to use where the program does not choose one.
     by: OnceLock<DetectorValue>,
-    pub(super) ratios: Cache<Key<ContourRatioOptions>, ContourRatio>,
-    pub(super) chamfers: Cache<Key<ChamferOptions>, Chamfer>,
-    pub(super) regions: Cache<Key<RegionOptions>, Region>,
-    /// The same photograph with contours detected by other settings: the detector and the
-    /// minimum strength.
-    detected: Cache<(DetectorSettings, f32), Value>,
-    /// Maps from detectors that were read from files, by detector and size.
-    soft: Cache<(DetectorValue, u32), SoftMap>,
-    /// Candidate objects, by the options of the search.
-    pub(super) candidates: Cache<CandidateOptions, Vec<Candidate>>,
-    /// The people in the photograph, by the options of the search: the number of views,
-    /// and the maximum number of people.
-    pub(super) people: Cache<(u32, u32), Vec<(Person, Value)>>,
+    /// Contours by other detectors, candidate objects, people, and the reference data of
+    /// comparators.
+    pub(super) prepared: Prepared,
 }
 
 impl ImageValue {
@@ -107,14 +106,15 @@ impl ImageValue {
     /// Returns the people that programs detected in it, most prominent first; `None` if
     /// no program did.
     pub fn people(&self) -> Option<Vec<Person>> {
-        self.people.any().map(|all| all.iter().map(|(p, _)| p.clone()).collect())
+        let all = self.prepared.first::<PeopleKey, Vec<(Person, Value)>>()?;
+        Some(all.iter().map(|(p, _)| p.clone()).collect())
     }
 
     /// Returns its contours, detecting them if necessary.
     ///
     /// # Errors
     /// If the detector chosen for it fails.
-    pub fn map(&self) -> Result<&ContourMap, String> {
+    pub fn map(&self) -> Result<&ContourMap, Fault> {
         let found = self.map.get_or_init(|| match &self.photo {
             Some(photo) => {
                 let (by, least) = DetectorSettings::usual(self.by.get());
@@ -122,12 +122,12 @@ impl ImageValue {
             }
             None => Ok(ContourMap::default()),
         });
-        found.as_ref().map_err(String::clone)
+        found.as_ref().map_err(Fault::clone)
     }
 
     /// Returns the contours that programs have used; `None` if they have used none.
     pub fn seen(&self) -> Option<ContourMap> {
-        let otherwise = self.detected.any();
+        let otherwise = self.prepared.first::<(DetectorSettings, f32), Value>();
         let image = otherwise.as_ref().and_then(|v| v.downcast::<ImageValue>()).unwrap_or(self);
         image.map.get()?.as_ref().ok().cloned()
     }
@@ -159,22 +159,24 @@ impl ImageValue {
         &self,
         by: DetectorSettings,
         least: f32,
-    ) -> Result<Option<Value>, String> {
+    ) -> Result<Option<Value>, Fault> {
         let Some(photo) = &self.photo else { return Ok(None) };
-        let found = self.detected.get((by, least), |(by, least)| {
+        let found = self.prepared.get((by, least), |(by, least)| {
             let map = strong(self.found(photo, by)?, *least);
             Ok(Value::object(ImageValue::contours(map, Some(photo.clone()))))
         })?;
         Ok(Some(Value::clone(&found)))
     }
 
-    fn found(&self, photo: &Photo, by: &DetectorSettings) -> Result<ContourMap, String> {
+    fn found(&self, photo: &Photo, by: &DetectorSettings) -> Result<ContourMap, Fault> {
         match by {
             DetectorSettings::Gradients(detector) => Ok(detector.contours(photo)),
             DetectorSettings::File { detector, size, sigma } => {
-                let Some(file) = &detector.0 else { return Err("the detector has no file".into()) };
-                let soft = self.soft.get((detector.clone(), *size), |_| {
-                    file.map(photo, *size).map_err(|e| e.to_string())
+                let fault = |why: String| Fault::new(FaultKind::Other, why);
+                let file =
+                    detector.0.as_ref().ok_or_else(|| fault("the detector has no file".into()))?;
+                let soft: Arc<SoftMap> = self.prepared.get((detector.clone(), *size), |_| {
+                    file.map(photo, *size).map_err(|e| fault(e.to_string()))
                 })?;
                 Ok(soft.contours_of(photo, *sigma))
             }
@@ -196,7 +198,7 @@ impl ImageValue {
 pub struct DetectorValue(pub Option<Arc<dyn ContourDetector>>);
 
 impl PartialEq for DetectorValue {
-    /// Whether both come from the same reading of a file, which may have changed in
+    /// Equal if both come from the same reading of a file, which may have changed in
     /// between.
     fn eq(&self, other: &Self) -> bool {
         match (&self.0, &other.0) {
@@ -287,13 +289,13 @@ impl Object for ImageValue {
 pub struct MaskValue {
     /// The mask.
     pub mask: Mask,
-    pub(super) prepared: Cache<Key<[f64; 2]>, MaskLikelihood>,
+    pub(super) prepared: Prepared,
 }
 
 impl MaskValue {
     /// Creates an observed mask.
     pub fn new(mask: Mask) -> Self {
-        MaskValue { mask, prepared: Cache::default() }
+        MaskValue { mask, prepared: Prepared::default() }
     }
 }
 
@@ -316,13 +318,13 @@ impl Object for MaskValue {
 pub struct DepthValue {
     /// The depth map.
     pub depth: DepthMap,
-    pub(super) prepared: Cache<Key<[f64; 4]>, DepthLikelihood>,
+    pub(super) prepared: Prepared,
 }
 
 impl DepthValue {
     /// Creates an observed depth map.
     pub fn new(depth: DepthMap) -> Self {
-        DepthValue { depth, prepared: Cache::default() }
+        DepthValue { depth, prepared: Prepared::default() }
     }
 }
 
@@ -374,16 +376,16 @@ mod tests {
 
     #[test]
     fn options_that_move_do_not_fill_the_memory() {
-        let prepared: Cache<u32, u32> = Cache::default();
-        prepared.get(0, |_| Ok(7)).unwrap();
-        let first = Arc::downgrade(&prepared.get(1, |_| Ok(2)).unwrap());
+        let prepared = Prepared::default();
+        let get = |key: u32, made: u32| *prepared.get(key, |_| Ok(made)).unwrap();
+        get(0, 7);
+        let first: Arc<u32> = prepared.get(1, |_| Ok(2)).unwrap();
+        let first = Arc::downgrade(&first);
+        prepared.get("another type", |_| Ok(())).unwrap();
         for key in 0..1000 {
-            assert_eq!(
-                *prepared.get(key, |k| Ok(k + 1)).unwrap(),
-                if key == 0 { 7 } else { key + 1 }
-            );
+            assert_eq!(get(key, key + 1), if key == 0 { 7 } else { key + 1 });
         }
-        assert_eq!(prepared.0.lock().unwrap().len(), MOST);
-        assert!(first.upgrade().is_none() && *prepared.get(0, |_| Ok(8)).unwrap() == 7);
+        assert_eq!(prepared.0.lock().unwrap().len(), MOST + 1);
+        assert!(first.upgrade().is_none() && get(0, 8) == 7);
     }
 }

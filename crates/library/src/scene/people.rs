@@ -1,9 +1,9 @@
 //! The people in a photograph, as values: a thin layer over [`pcadlang_detectors::people`].
 
-use super::observed::{KeypointsValue, MaskValue};
+use super::observed::{KeypointsValue, MaskValue, PeopleKey};
 use super::{IMAGE, ImageValue, native};
 use pcadlang_detectors::people::{FindOptions, Person, networks};
-use pcadlang_engine::lang::builtins::{Row, Type, arg, opt};
+use pcadlang_engine::lang::builtins::{Default, Row, Type, arg, int};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::vision::keypoints::{Alternative, Keypoint, Keypoints, MEDIAPIPE};
@@ -21,19 +21,19 @@ pub(super) const TABLE: &[Row] = &[native(
     "Finding",
     &[
         arg("photo", IMAGE, "The photograph; people cannot be detected in a contour map."),
-        opt(
+        int(
             "views",
-            Type::Int,
-            "2",
-            "The number of views, 2 to 8: with increasing padding, each also mirrored.",
+            2,
+            [2, 8],
+            "The number of views: with increasing padding, each also mirrored.",
         ),
-        opt("most", Type::Int, "2", "The maximum number of people per view, 1 to 100."),
-        opt(
+        int("most", 2, [1, 100], "The maximum number of people per view."),
+        arg(
             "near",
             Type::Array,
-            "[]",
             "A box [x, y, width, height]: people who fill it best come first.",
         )
+        .or(Default::Nums(&[]))
         .unit("pixels"),
     ],
     Type::Array,
@@ -47,20 +47,19 @@ pub(super) const TABLE: &[Row] = &[native(
     |a| {
         let image = a.object::<ImageValue>(0, "an image")?;
         let Some(photo) = image.as_photo() else { return Ok(Value::List(Arc::from([]))) };
-        let views = if a.given(1) { a.int_in(1, 2, 8)? as u32 } else { 2 };
-        let most = if a.given(2) { a.int_in(2, 1, 100)? as u32 } else { 2 };
-        let near: Arc<[f64]> = if a.given(3) { a.array(3)? } else { Arc::from([]) };
+        let (views, most, near) = (a.int("views")?, a.int("most")?, a.array("near")?);
         if !near.is_empty() && near.len() != 4 {
-            return Err(a.wrong_length(3, "4 numbers"));
+            return Err(a.wrong_length("near", "4 numbers"));
         }
-        let found = image.people.get((views, most), |_| {
+        let key: PeopleKey = (views, most);
+        let found = image.prepared.get(key, |_| {
             let options = FindOptions { views, most: most as usize, ..FindOptions::default() };
-            let finder = networks::finder()?;
-            let found = finder.find(photo, &options, 0).map_err(|e| e.to_string())?;
-            found.into_iter().map(|p| Ok((p.clone(), value(&p, photo)?))).collect()
+            let fault = |why: String| Fault::new(FaultKind::Other, format!("scene.people: {why}"));
+            let finder = networks::finder().map_err(|why| fault(why.into()))?;
+            let found = finder.find(photo, &options, 0).map_err(|e| fault(e.to_string()))?;
+            found.into_iter().map(|p| Ok((p.clone(), value(&p, photo).map_err(fault)?))).collect()
         });
-        let found = found
-            .map_err(|e: String| Fault::new(FaultKind::Other, format!("scene.people: {e}")))?;
+        let found: Arc<Vec<(Person, Value)>> = found?;
         let mut order: Vec<usize> = (0..found.len()).collect();
         if let [x, y, w, h] = near[..] {
             let wanted = [x, y, x + w, y + h];

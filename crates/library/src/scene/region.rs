@@ -3,17 +3,17 @@
 //! pixel.
 
 use super::compare::{
-    SECTION, SEEN, SIZE, by_silhouette, by_view, drawn, image, likelihood, size, view,
+    SECTION, SEEN, SIZE, SharedTally, by_silhouette, by_view, drawn, image, reading, tallying,
+    unsuitable,
 };
 use super::incremental;
 use super::observed::ImageValue;
-use super::shared_tally::SharedTally;
 use pcadlang_engine::lang::adjoint::Adjoint;
-use pcadlang_engine::lang::builtins::{Args, PreviousEvaluation, Row, State, Type, opt};
+use pcadlang_engine::lang::builtins::{Args, PreviousEvaluation, Row, State, Type, int, num, word};
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_engine::lang::value::{Likelihood, Value};
 use pcadlang_numerics::rng::Stream;
-use pcadlang_scene::render::{Frame, View};
+use pcadlang_scene::render::{Channel, Frame, View};
 use pcadlang_scene::vision::region::{Quantised, Tally};
 use pcadlang_scene::vision::{Region, RegionOptions};
 use std::cell::RefCell;
@@ -22,34 +22,21 @@ use std::sync::Arc;
 /// The maximum number of groups besides the background; further parts share the last one.
 const MOST_GROUPS: u16 = 15;
 
+const USUAL: RegionOptions = RegionOptions::USUAL;
+
 pub(super) const TABLE: &[Row] = &[incremental(
     "region",
     SECTION,
     &[
         SEEN,
-        opt("power", Type::Num, "0.05", "The power of the term for the whole picture."),
-        opt(
-            "tiles",
-            Type::Int,
-            "8",
-            "The number of tiles along each side of the picture, each with its own colour distribution; 0: none.",
-        ),
-        opt("tile_power", Type::Num, "0.1", "The power of the term for the tiles."),
-        opt("colours", Type::Int, "32", "The number of colours the photograph is reduced to, 2 to 256."),
-        opt(
-            "groups",
-            Type::Str,
-            "\"silhouette\"",
-            "The regions with their own colour distribution, besides the background: \
+        num("power", USUAL.power, "The power of the term for the whole picture."),
+        int("tiles", USUAL.tiles, [0, 64], "The number of tiles along each side of the picture, each with its own colour distribution; 0: none."),
+        num("tile_power", USUAL.tile_power, "The power of the term for the tiles."),
+        int("colours", USUAL.colours as u32, [2, 256], "The number of colours the photograph is reduced to."),
+        word("groups", &["silhouette", "parts"], "The regions with their own colour distribution, besides the background: \
              \"silhouette\": the object; \"parts\": each of its parts, with all from the 15th on \
-             as one.",
-        ),
-        opt(
-            "shading",
-            Type::Num,
-            "0",
-            "The power of the term for shading, whether brightness follows the normals; 0: off.",
-        ),
+             as one."),
+        num("shading", USUAL.shading, "The power of the term for shading, whether brightness follows the normals; 0: off."),
         SIZE,
     ],
     Type::Likelihood,
@@ -76,31 +63,25 @@ struct RegionOf {
 }
 
 fn region(a: &Args, previous: Option<&PreviousEvaluation>) -> Result<(Value, State), Fault> {
-    let d = RegionOptions::default();
-    let whole = |i: usize, lo: i64, hi: i64, default: i64| {
-        if a.given(i) { a.int_in(i, lo, hi) } else { Ok(default) }
-    };
     let options = RegionOptions {
-        power: a.num_or(1, d.power)?,
-        tiles: whole(2, 0, 64, i64::from(d.tiles))? as u32,
-        tile_power: a.num_or(3, d.tile_power)?,
-        colours: whole(4, 2, 256, d.colours as i64)? as usize,
-        shading: a.num_or(6, d.shading)?,
-        ..d
+        power: a.num("power")?,
+        tiles: a.int("tiles")?,
+        tile_power: a.num("tile_power")?,
+        colours: a.int("colours")? as usize,
+        shading: a.num("shading")?,
+        ..USUAL
     };
-    let groups = match a.choice(5, &["silhouette", "parts"])? {
-        "parts" => Groups::Parts,
-        _ => Groups::Silhouette,
-    };
-    let tally = SharedTally::after(previous);
-    let value = likelihood(RegionOf {
-        view: view(a)?,
-        size: size(a, 7)?,
-        groups,
-        options,
-        tally: Arc::clone(&tally),
-    })?;
-    Ok((value, tally))
+    let groups = if a.word("groups")? == "parts" { Groups::Parts } else { Groups::Silhouette };
+    let (view, size) = reading(a, channel(groups, &options))?;
+    tallying(previous, |tally| RegionOf { view, size, groups, options, tally })
+}
+
+/// The channel that it reads: depth, if it depends on the silhouette only.
+fn channel(groups: Groups, options: &RegionOptions) -> Channel {
+    match groups {
+        Groups::Silhouette if options.shading == 0.0 => Channel::Depth,
+        _ => Channel::Frame,
+    }
 }
 
 thread_local! {
@@ -110,22 +91,21 @@ thread_local! {
 impl RegionOf {
     /// Whether the likelihood depends on the silhouette only.
     fn outline(&self) -> bool {
-        self.groups == Groups::Silhouette && self.options.shading == 0.0
+        channel(self.groups, &self.options) == Channel::Depth
     }
 
     /// Returns the observed colours, prepared at the rendered size.
-    fn region(&self, observed: &Value) -> Result<Arc<Region>, String> {
+    fn region(&self, observed: &Value) -> Result<Arc<Region>, Fault> {
         let image = image(observed, &self.view, self.name())?;
         let Some(photo) = image.as_photo() else {
-            return Err(
-                "scene.region: colours need a photograph, and only a contour map was observed"
-                    .into(),
-            );
+            return Err(Fault::type_error(
+                "scene.region: colours need a photograph, and only a contour map was observed",
+            ));
         };
         let camera = self.view.camera().scaled_to(self.size);
         let key = (self.options.clone(), camera.width, camera.height);
-        image.regions.get(key, |(options, w, h)| {
-            Region::prepare(photo, *w, *h, options).map_err(|e| format!("scene.region: {e}"))
+        image.prepared.get(key, |(options, w, h)| {
+            Region::prepare(photo, *w, *h, options).map_err(unsuitable(self.name()))
         })
     }
 
@@ -153,7 +133,7 @@ impl Likelihood for RegionOf {
         vec![drawn(self.size)]
     }
 
-    fn log_density(&self, observed: &Value) -> Result<f64, String> {
+    fn log_density(&self, observed: &Value) -> Result<f64, Fault> {
         let region = self.region(observed)?;
         Ok(GROUPS.with_borrow_mut(|groups| {
             self.tally.with(&region, |tally| {
@@ -167,7 +147,7 @@ impl Likelihood for RegionOf {
     /// Only if the options make it a probability of colour-reduced pictures. The result
     /// is the observed photograph with simulated colours prepared for these options and
     /// the rendered size.
-    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, String>> {
+    fn sample(&self, observed: &Value, rng: &mut Stream) -> Option<Result<Value, Fault>> {
         if !self.is_proper() {
             return None;
         }
@@ -175,13 +155,13 @@ impl Likelihood for RegionOf {
             let (frame, mut groups) = (self.frame(), Vec::new());
             self.fill(&frame, &mut groups);
             let labels = region.simulate(&groups, rng);
-            let wrong = |e| format!("scene.region: {e}");
             let picture = Quantised::new(frame.width, frame.height, region.colours(), labels)
-                .map_err(wrong)?;
-            let other = Region::of(&picture, &self.options).map_err(wrong)?;
+                .map_err(unsuitable(self.name()))?;
+            let other = Region::of(&picture, &self.options).map_err(unsuitable(self.name()))?;
             let photo = image(observed, &self.view, self.name())?.as_photo().cloned();
             let value = photo.map_or_else(ImageValue::default, ImageValue::photo);
-            value.regions.get((self.options.clone(), frame.width, frame.height), |_| Ok(other))?;
+            let key = (self.options.clone(), frame.width, frame.height);
+            value.prepared.get(key, |_| Ok(other))?;
             Ok(Value::object(value))
         };
         Some(self.region(observed).and_then(draw))
@@ -271,29 +251,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_out_is_as_the_reference_says() {
-        let d = RegionOptions::default();
-        let (tiles, colours) = (f64::from(d.tiles), d.colours as f64);
-        for (name, used) in [
-            ("power", d.power),
-            ("tiles", tiles),
-            ("tile_power", d.tile_power),
-            ("colours", colours),
-            ("shading", d.shading),
-        ] {
-            let arg = TABLE[0].args.iter().find(|a| a.name == name).unwrap();
-            assert_eq!(arg.default.unwrap().parse::<f64>().unwrap(), used, "{name}");
-        }
-    }
-
-    #[test]
     fn contour_maps_and_other_things_are_refused() {
         let l = of(0.0, Groups::Silhouette, &RegionOptions::default());
         let map = Value::object(ImageValue::contours(ContourMap::new(64, 64), None));
-        assert!(l.log_density(&map).unwrap_err().contains("need a photograph"));
-        assert!(l.log_density(&Value::Num(1.0)).unwrap_err().contains("must be an image"));
+        assert!(l.log_density(&map).unwrap_err().message.contains("need a photograph"));
+        assert!(l.log_density(&Value::Num(1.0)).unwrap_err().message.contains("must be an image"));
         let bad = RegionOptions { power: -1.0, ..RegionOptions::default() };
-        let said = of(0.0, Groups::Silhouette, &bad).log_density(&photograph()).unwrap_err();
+        let said =
+            of(0.0, Groups::Silhouette, &bad).log_density(&photograph()).unwrap_err().message;
         assert!(said.contains("scene.region: power must be at least 0"), "{said}");
         assert!(!l.is_proper());
     }

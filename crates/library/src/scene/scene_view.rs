@@ -5,7 +5,7 @@ use super::compare::{by_contours, by_silhouette};
 use pcadlang_engine::lang::adjoint::Adjoint;
 use pcadlang_engine::lang::builtins::Args;
 use pcadlang_engine::lang::error::Fault;
-use pcadlang_scene::render::View;
+use pcadlang_scene::render::{Channel, View};
 use std::fmt;
 use std::sync::Arc;
 
@@ -44,18 +44,21 @@ impl SceneView {
 
     /// Returns whether each pixel shows the solid, row by row.
     pub fn mask(&self, longer: u32) -> Vec<bool> {
+        self.0.declare(Channel::Frame, longer);
         self.0.frame(longer).mask().collect()
     }
 
     /// Returns the depth of each pixel, row by row, in scene units; infinite where the
     /// pixel does not show the solid.
     pub fn depth(&self, longer: u32) -> Vec<f32> {
+        self.0.declare(Channel::Depth, longer);
         self.0.depth(longer).depth.clone()
     }
 
     /// Returns the pieces of the contours: x, y and length in pixels, and the angle in
     /// radians, measured from right towards down.
     pub fn contours(&self, longer: u32) -> Vec<[f64; 4]> {
+        self.0.declare(Channel::Contours, longer);
         let c = self.0.contours(longer);
         let piece = |i: usize| {
             let angle = libm::atan2(f64::from(c.ty[i]), f64::from(c.tx[i]));

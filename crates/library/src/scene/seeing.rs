@@ -1,10 +1,9 @@
 //! Cameras and views.
 
-use super::shapes::vector;
 use super::{CAMERA, CameraValue, SOLID, SolidValue, VIEW, ViewValue, incremental, native};
 use glam::DVec3;
 use pcadlang_engine::lang::adjoint::Adjoint;
-use pcadlang_engine::lang::builtins::{Row, Type, arg, opt};
+use pcadlang_engine::lang::builtins::{Args, Default, Row, Type, arg, int, num, opt};
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::render::{Camera, Projection, View};
@@ -18,34 +17,25 @@ pub(super) const TABLE: &[Row] = &[
         "camera",
         SECTION,
         &[
-            opt("position", Type::Array, "[0, 0, 8]", "The position of the camera.")
+            arg("position", Type::Array, "The position of the camera.")
+                .or(Default::Nums(&[0.0, 0.0, 8.0]))
                 .unit("scene units"),
-            opt(
-                "look_at",
-                Type::Array,
-                "[0, 0, 0]",
-                "The point it looks at, at the centre of the picture.",
-            )
-            .unit("scene units"),
-            opt("up", Type::Array, "[0, 1, 0]", "The direction that points up in the picture."),
-            opt(
-                "focal",
-                Type::Num,
-                "1.818",
-                "The focal length as a multiple of the picture's longer side.",
-            ),
-            opt("width", Type::Int, "256", "The width of the picture.").unit("pixels"),
-            opt("height", Type::Int, "256", "The height of the picture.").unit("pixels"),
+            arg("look_at", Type::Array, "The point it looks at, at the centre of the picture.")
+                .or(Default::Nums(&[0.0, 0.0, 0.0]))
+                .unit("scene units"),
+            arg("up", Type::Array, "The direction that points up in the picture.")
+                .or(Default::Nums(&[0.0, 1.0, 0.0])),
+            num("focal", 8.0 / 4.4, "The focal length as a multiple of the picture's longer side.")
+                .positive(),
+            int("width", 256, [1, 16384], "The width of the picture.").unit("pixels"),
+            int("height", 256, [1, 16384], "The height of the picture.").unit("pixels"),
         ],
         CAMERA,
         "A pinhole camera. By default a view uses the camera of the run: `--camera`, or the default view.",
         |a| {
-            let eye = vector(a, 0, DVec3::new(0.0, 0.0, 8.0))?;
-            let target = vector(a, 1, DVec3::ZERO)?;
-            let up = vector(a, 2, DVec3::Y)?;
-            let focal = a.positive_or(3, 8.0 / 4.4)?;
-            let side = |i: usize| if a.given(i) { a.int_in(i, 1, 16384) } else { Ok(256) };
-            let (width, height) = (side(4)? as u32, side(5)? as u32);
+            let vector = |name: &str| a.vec3(name).map(DVec3::from);
+            let (eye, target, up) = (vector("position")?, vector("look_at")?, vector("up")?);
+            let (focal, width, height) = (a.num("focal")?, a.int("width")?, a.int("height")?);
             let forward = (target - eye).try_normalize();
             let right = forward.and_then(|f| f.cross(up).try_normalize());
             let (Some(forward), Some(right)) = (forward, right) else {
@@ -81,11 +71,7 @@ pub(super) const TABLE: &[Row] = &[
         "A solid seen by a camera. It is rendered only when a likelihood or report needs it.",
         |a, previous| {
             let solid = a.object::<SolidValue>(0, "a solid")?;
-            let camera = match a.given(1) {
-                true => a.object::<CameraValue>(1, "a camera")?.0,
-                false => Camera::default_for(256, 256),
-            };
-            let view = View::new(solid.0.clone(), camera);
+            let view = View::new(solid.0.clone(), camera(a, (256, 256))?);
             let view = match previous.and_then(|p| p.value.downcast::<ViewValue>()) {
                 Some(previous) => view.after(&previous.0),
                 None => view,
@@ -110,6 +96,14 @@ pub(super) const TABLE: &[Row] = &[
         },
     ),
 ];
+
+/// The camera of a call, or the default view with a picture of this size.
+pub(super) fn camera(a: &Args, (width, height): (u32, u32)) -> Result<Camera, Fault> {
+    match a.given("camera") {
+        true => Ok(a.object::<CameraValue>("camera", "a camera")?.0),
+        false => Ok(Camera::default_for(width, height)),
+    }
+}
 
 #[cfg(test)]
 mod tests {

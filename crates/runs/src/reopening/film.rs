@@ -4,7 +4,7 @@
 use crate::args::Film;
 use crate::failure::{Failure, plain};
 use crate::files;
-use crate::ready::{self, Ready};
+use crate::inputs::{self, Ready};
 use crate::reopening::reopened::Reopened;
 use crate::scene;
 use glam::{DMat3, DVec3};
@@ -39,7 +39,7 @@ pub fn film(a: &Film) -> Result<(), Failure> {
 /// Writes the film of a run.
 pub fn write(a: &Film) -> Result<(), Failure> {
     let run = Reopened::open(&a.run)?;
-    let ready = ready::prepare_program(run.program()?, &run.job, Instant::now())?;
+    let ready = inputs::prepare_program(run.program()?, &run.job, Instant::now())?;
     let states = way(&run, a.states as usize)?;
     match a.out.extension().and_then(|e| e.to_str()) {
         Some("glb") => files::write(&a.out, &animation(&run, &ready, &states)?)?,

@@ -4,7 +4,7 @@ use crate::args::Show;
 use crate::failure::{Failure, plain};
 use crate::reopening::reopened::{Reopened, quoted};
 use crate::scene;
-use crate::{files, ready};
+use crate::{files, inputs};
 use pcadlang_report::pictures::png;
 use pcadlang_report::{number, table};
 use pcadlang_scene::geom::{glb, obj};
@@ -32,7 +32,7 @@ pub fn show(a: &Show) -> Result<(), Failure> {
                 .clone()
         }
     };
-    let ready = ready::prepare_program(run.program()?, &run.job, Instant::now())?;
+    let ready = inputs::prepare_program(run.program()?, &run.job, Instant::now())?;
     let mut trace = run.trace(&ready.model, &saved)?;
     let Some(out) = &a.out else {
         print_line!("pcadlang run {}", quoted(&run.arguments));

@@ -26,5 +26,5 @@ pub use crate::contours::{ContourChange, ContourSlice, Contours};
 pub use camera::{Camera, CameraError, Projection};
 pub use pixels::frame::{Channels, Frame};
 pub use pixels::shade::shade;
-pub use view::View;
+pub use view::{Channel, View};
 pub use work::{Work, work};

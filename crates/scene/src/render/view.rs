@@ -9,10 +9,31 @@ use super::pixels::fractions::Fractions;
 use super::{Camera, Channels, ContourChange, Contours, Frame};
 use crate::geom::Solid;
 use glam::DVec3;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// Values by image size; few sizes are ever requested, so a list is enough.
-type BySize<T> = Mutex<Vec<(u32, T)>>;
+/// A channel of the picture of a view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Channel {
+    /// Parts and normals, with depth.
+    Frame,
+    /// Depth, or what it covers.
+    Depth,
+    /// The fraction of each pixel that is covered.
+    Fractions,
+    /// Contours.
+    Contours,
+}
+
+/// The pictures of one size, each drawn on first use.
+#[derive(Default)]
+struct Pictures {
+    frame: OnceLock<Arc<Frame>>,
+    depth: OnceLock<Arc<Frame>>,
+    fractions: OnceLock<Arc<Fractions>>,
+    contours: OnceLock<Arc<Contours>>,
+    /// `None` where the picture is better drawn in full.
+    change: OnceLock<Option<Arc<ContourChange>>>,
+}
 
 /// A solid and the camera that sees it. `Send` and `Sync`; share it in an `Arc`.
 pub struct View {
@@ -20,23 +41,12 @@ pub struct View {
     camera: Camera,
     /// Shared with the views before and after it.
     canvas: Canvas,
-    frames: BySize<Arc<Frame>>,
-    depths: BySize<Arc<Frame>>,
-    fractions: BySize<Arc<Fractions>>,
-    contours: BySize<Arc<Contours>>,
-    /// `None` where the picture is better drawn in full.
-    changes: BySize<Option<Arc<ContourChange>>>,
-    expected: Expected,
-}
-
-/// The sizes at which the view before this one drew in full: comparators ask each view of a
-/// trace's node for the same, so contours are read from the drawing that will be asked for
-/// next, instead of drawing what they need by themselves.
-#[derive(Default)]
-struct Expected {
-    frames: Vec<u32>,
-    depths: Vec<u32>,
-    contours: Vec<u32>,
+    /// The pictures by size; few sizes are ever requested, so a list is enough.
+    pictures: Mutex<Vec<(u32, Arc<Pictures>)>>,
+    /// The channels that comparators declared, of this view and of the one before it: where one
+    /// reads contours and another depth, contours are read from the depth.
+    read: Mutex<Vec<(Channel, u32)>>,
+    read_before: Vec<(Channel, u32)>,
 }
 
 impl View {
@@ -46,12 +56,9 @@ impl View {
             solid,
             camera,
             canvas: Canvas::default(),
-            frames: Mutex::default(),
-            depths: Mutex::default(),
-            fractions: Mutex::default(),
-            contours: Mutex::default(),
-            changes: Mutex::default(),
-            expected: Expected::default(),
+            pictures: Mutex::default(),
+            read: Mutex::default(),
+            read_before: Vec::new(),
         }
     }
 
@@ -59,17 +66,39 @@ impl View {
     /// differs between the two.
     #[must_use]
     pub fn after(self, previous: &View) -> View {
-        // A view whose density was not needed has drawn nothing.
-        fn or(drawn: Vec<u32>, expected: &[u32]) -> Vec<u32> {
-            if drawn.is_empty() { expected.to_vec() } else { drawn }
+        let read = previous.read.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        // A view whose density was not needed has no comparators.
+        let read_before = if read.is_empty() { previous.read_before.clone() } else { read };
+        View { canvas: previous.canvas.for_next(), read_before, ..self }
+    }
+
+    /// Declares that a comparator reads a channel of the picture whose longer side has `size`
+    /// pixels.
+    pub fn declare(&self, channel: Channel, size: u32) {
+        let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
+        if !read.contains(&(channel, size)) {
+            read.push((channel, size));
         }
-        let contours = [sizes(&previous.contours), sizes(&previous.changes)].concat();
-        let expected = Expected {
-            frames: or(sizes(&previous.frames), &previous.expected.frames),
-            depths: or(sizes(&previous.depths), &previous.expected.depths),
-            contours: or(contours, &previous.expected.contours),
-        };
-        View { canvas: previous.canvas.for_next(), expected, ..self }
+    }
+
+    /// Returns whether a comparator reads a channel, of this view or of the one before it.
+    fn is_read(&self, channel: Channel, size: u32) -> bool {
+        let read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
+        read.contains(&(channel, size)) || self.read_before.contains(&(channel, size))
+    }
+
+    /// The pictures of a size. A second thread that asks for one waits rather than drawing it
+    /// again.
+    fn of(&self, size: u32) -> Arc<Pictures> {
+        let mut all = self.pictures.lock().unwrap_or_else(PoisonError::into_inner);
+        match all.iter().find(|(at, _)| *at == size) {
+            Some((_, pictures)) => Arc::clone(pictures),
+            None => {
+                let pictures = Arc::default();
+                all.push((size, Arc::clone(&pictures)));
+                pictures
+            }
+        }
     }
 
     /// The solid.
@@ -84,30 +113,29 @@ impl View {
 
     /// All channels of the picture whose longer side has `size` pixels (0 counts as 1).
     pub fn frame(&self, size: u32) -> Arc<Frame> {
-        once(&self.frames, size, || {
-            let camera = self.camera.scaled_to(size);
-            Arc::new(drawn_frame(&self.solid, &camera, Channels::All))
-        })
+        let draw = || drawn_frame(&self.solid, &self.camera.scaled_to(size), Channels::All).into();
+        Arc::clone(self.of(size).frame.get_or_init(draw))
     }
 
     /// A frame with depth at least, in the picture whose longer side has `size` pixels (0
     /// counts as 1): cheaper than [`View::frame`], and reused by contours of that size
     /// that are requested later.
     pub fn depth(&self, size: u32) -> Arc<Frame> {
-        self.depth_drawn(size).unwrap_or_else(|| {
-            let contours = self.expects_contours(size);
+        let pictures = self.of(size);
+        pictures.with_depth().cloned().unwrap_or_else(|| {
+            let contours = pictures.change.get().is_some() || self.is_read(Channel::Contours, size);
             // The canvas has meshes only.
             let on_canvas = self.solid.revolution().is_none()
                 && (!contours || self.change_on_canvas(size).is_some());
-            once(&self.depths, size, || {
+            let draw = || {
                 let (solid, camera) = (&self.solid, self.camera.scaled_to(size));
                 let drawn = || self.canvas.depth(solid, &camera, contours);
-                let depth = on_canvas.then(drawn).flatten();
-                Arc::new(match depth {
+                Arc::new(match on_canvas.then(drawn).flatten() {
                     Some(depth) => Frame::of_depth(&camera, depth),
                     None => drawn_frame(solid, &camera, Channels::Depth),
                 })
-            })
+            };
+            Arc::clone(pictures.depth.get_or_init(draw))
         })
     }
 
@@ -119,19 +147,21 @@ impl View {
 
     /// The same, with what its derivatives need.
     pub(super) fn covered(&self, size: u32) -> Arc<Fractions> {
-        once(&self.fractions, size, || {
+        let draw = || {
             let (solid, camera) = (&self.solid, self.camera.scaled_to(size));
             let samples = solid.revolution().is_none().then(|| Fractions::of(solid, &camera));
             Arc::new(samples.flatten().unwrap_or_else(|| {
                 let draw = |finer: &Camera| drawn_frame(solid, finer, Channels::Depth);
                 Fractions::by_pixels(&camera, draw)
             }))
-        })
+        };
+        Arc::clone(self.of(size).fractions.get_or_init(draw))
     }
 
     /// The contours in the picture whose longer side has `size` pixels (0 counts as 1).
     pub fn contours(&self, size: u32) -> Arc<Contours> {
-        once(&self.contours, size, || {
+        let pictures = self.of(size);
+        let draw = || {
             let change = self.change_on_canvas(size);
             if let Some(change) = change.as_ref().filter(|c| c.moving.len() == c.count) {
                 return Arc::clone(&change.moving);
@@ -140,11 +170,13 @@ impl View {
             if change.is_some() {
                 return Arc::new(self.canvas.contours(solid, &camera));
             }
-            Arc::new(match self.depth_drawn(size).or_else(|| self.depth_expected(size)) {
+            let depth = pictures.with_depth().cloned().or_else(|| self.depth_read(size));
+            Arc::new(match depth {
                 Some(frame) => Contours::with_depth(solid, &camera, &frame.depth),
                 None => Contours::of(solid, &camera),
             })
-        })
+        };
+        Arc::clone(pictures.contours.get_or_init(draw))
     }
 
     /// The difference of [`View::contours`] from the contours drawn last on the same
@@ -156,12 +188,14 @@ impl View {
 
     /// The change, unless the picture is better drawn in full, or its depth is known.
     fn change_on_canvas(&self, size: u32) -> Option<Arc<ContourChange>> {
-        once(&self.changes, size, || {
-            if self.solid.revolution().is_some() || self.depth_drawn(size).is_some() {
+        let pictures = self.of(size);
+        let draw = || {
+            if self.solid.revolution().is_some() || pictures.with_depth().is_some() {
                 return None;
             }
             self.canvas.change(&self.solid, &self.camera.scaled_to(size)).map(Arc::new)
-        })
+        };
+        pictures.change.get_or_init(draw).clone()
     }
 
     /// The vector-Jacobian product of [`View::contours`] with respect to the solid's
@@ -171,22 +205,19 @@ impl View {
         self.contours(size).vjp(&self.solid, &camera, by_piece)
     }
 
-    /// True if contours of this size are drawn, or expected to be asked for.
-    fn expects_contours(&self, size: u32) -> bool {
-        self.expected.contours.contains(&size) || find(&self.changes, size).is_some()
-    }
-
-    /// A frame with depth at least, if one is expected to be asked for.
-    fn depth_expected(&self, size: u32) -> Option<Arc<Frame>> {
-        if self.expected.frames.contains(&size) {
+    /// A frame with depth at least, if a comparator reads one.
+    fn depth_read(&self, size: u32) -> Option<Arc<Frame>> {
+        if self.is_read(Channel::Frame, size) {
             return Some(self.frame(size));
         }
-        self.expected.depths.contains(&size).then(|| self.depth(size))
+        self.is_read(Channel::Depth, size).then(|| self.depth(size))
     }
+}
 
+impl Pictures {
     /// A frame with depth at least, if one was drawn.
-    fn depth_drawn(&self, size: u32) -> Option<Arc<Frame>> {
-        find(&self.frames, size).or_else(|| find(&self.depths, size))
+    fn with_depth(&self) -> Option<&Arc<Frame>> {
+        self.frame.get().or(self.depth.get())
     }
 }
 
@@ -202,31 +233,6 @@ fn drawn_frame(solid: &Solid, camera: &Camera, channels: Channels) -> Frame {
         Some(r) => Frame::of_revolution(&r.surface, &r.affine, camera, channels),
         None => Frame::render(solid, camera, channels),
     }
-}
-
-fn lock<T>(cache: &BySize<T>) -> MutexGuard<'_, Vec<(u32, T)>> {
-    cache.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// The sizes for which there are values.
-fn sizes<T>(cache: &BySize<T>) -> Vec<u32> {
-    lock(cache).iter().map(|(size, _)| *size).collect()
-}
-
-fn find<T: Clone>(cache: &BySize<T>, size: u32) -> Option<T> {
-    lock(cache).iter().find(|(at, _)| *at == size).map(|(_, value)| value.clone())
-}
-
-/// The entry of a size, computed under the lock if missing: a second thread waits rather
-/// than computing it again.
-fn once<T: Clone>(cache: &BySize<T>, size: u32, make: impl FnOnce() -> T) -> T {
-    let mut entries = lock(cache);
-    if let Some((_, value)) = entries.iter().find(|(at, _)| *at == size) {
-        return value.clone();
-    }
-    let value = make();
-    entries.push((size, value.clone()));
-    value
 }
 
 #[cfg(test)]
@@ -259,14 +265,16 @@ mod tests {
         });
         let c = View::new(sphere(32, 16), Camera::default_for(96, 96));
         let after = |previous: &View| View::new(sphere(32, 16), *b.camera()).after(previous);
+        b.declare(Channel::Frame, 96);
         let next = after(&b);
         assert_eq!(*a.contours(96), *next.contours(96));
-        assert_eq!(find(&next.frames, 96).as_ref(), Some(&b.frame(96)), "drawn for the next one");
+        assert_eq!(next.of(96).frame.get(), Some(&b.frame(96)), "drawn for the next one");
         let depth = c.depth(96);
+        c.declare(Channel::Depth, 96);
         let next = after(&after(&c));
         assert_eq!(*a.contours(96), *next.contours(96));
-        assert_eq!(find(&next.depths, 96).as_ref(), Some(&depth), "drawn for the next one");
-        assert!(after(&next).expects_contours(96) && !after(&c).expects_contours(96));
+        assert_eq!(next.of(96).depth.get(), Some(&depth), "drawn for the next one");
+        assert!(next.is_read(Channel::Depth, 96) && !next.is_read(Channel::Contours, 96));
         assert!(depth.part.is_empty() && Arc::ptr_eq(&depth, &c.depth(96)));
         assert_eq!(depth.depth, b.frame(96).depth);
         assert!(Arc::ptr_eq(&b.depth(96), &b.frame(96)));

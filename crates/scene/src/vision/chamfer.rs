@@ -12,8 +12,8 @@ mod stationary;
 
 use self::reverse::Reverse;
 use self::stationary::Stationary;
+use super::elements::{CHANNELS, Edges, PER_RADIAN, channels_of, turn_between};
 use super::elements::{ComparatorError, Element, check};
-use super::field::{CHANNELS, Edges, PER_RADIAN, channels_of, turn_between};
 use super::pictures::contour_map::ContourMap;
 use crate::contours::{ContourChange, ContourSlice};
 use pcadlang_numerics::num::LN_SQRT_2PI;
@@ -56,15 +56,20 @@ pub struct ChamferOptions {
     pub oriented: Option<f64>,
 }
 
+impl ChamferOptions {
+    /// The defaults.
+    pub const USUAL: ChamferOptions = ChamferOptions {
+        sigma: 0.4,
+        mode: Mode::Mean,
+        symmetric: false,
+        truncate: None,
+        oriented: None,
+    };
+}
+
 impl Default for ChamferOptions {
     fn default() -> Self {
-        ChamferOptions {
-            sigma: 0.4,
-            mode: Mode::Mean,
-            symmetric: false,
-            truncate: None,
-            oriented: None,
-        }
+        ChamferOptions::USUAL
     }
 }
 

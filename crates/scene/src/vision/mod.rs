@@ -15,10 +15,8 @@ pub mod distance_transform;
 pub mod elements;
 pub mod error;
 pub mod features;
-mod field;
 pub mod keypoints;
 pub mod mask;
-mod nearest;
 pub mod pictures;
 pub mod region;
 

@@ -109,7 +109,9 @@ impl Observed {
         match features {
             Features::Contours { .. } => {
                 let image = image.ok_or_else(|| missing("the contours of a picture"))?;
-                Ok(Query::contours(&features::observed(image.map().map_err(BankError::Observed)?)))
+                Ok(Query::contours(&features::observed(
+                    image.map().map_err(|f| BankError::Observed(f.message))?,
+                )))
             }
             Features::Keypoints { names } => {
                 let seen = self.keypoints.as_ref().and_then(|v| v.downcast::<KeypointsValue>());

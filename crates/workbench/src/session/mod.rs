@@ -30,7 +30,7 @@ mod why;
 
 pub use background::Status;
 pub use change::Scores;
-pub use choices::{ChoiceRow, Marks, from_json, to_json};
+pub use choices::{ChoiceRow, Marks, to_json};
 pub use command::{COMMANDS, Command};
 pub use complete::Completion;
 pub use export::{exported, exported_operand};

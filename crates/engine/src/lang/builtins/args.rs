@@ -1,6 +1,6 @@
 //! Access to the arguments of a built-in, with errors that name the argument.
 
-use super::builtin::Args;
+use super::builtin::{Args, Argument, Domain};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::{MOST_ELEMENTS, Object, Record, Value};
 use std::borrow::Cow;
@@ -9,26 +9,63 @@ use std::sync::Arc;
 /// Numbers, borrowed if the value is already an array of numbers.
 type Numbers<'a> = Cow<'a, [f64]>;
 
+/// Which argument: its position, or its name.
+pub trait Which: Copy {
+    /// Returns its position.
+    fn position(self, args: &[Argument]) -> usize;
+}
+
+impl Which for usize {
+    #[inline]
+    fn position(self, _: &[Argument]) -> usize {
+        self
+    }
+}
+
+impl Which for &str {
+    fn position(self, args: &[Argument]) -> usize {
+        let found = args.iter().position(|a| a.name == self);
+        debug_assert!(found.is_some(), "no argument `{self}`");
+        found.unwrap_or(usize::MAX)
+    }
+}
+
 impl<'a> Args<'a> {
-    /// Returns argument `i`, or the table's default if it is omitted.
-    pub fn get(&self, i: usize) -> &'a Value {
+    /// Returns an argument, or its default if it is omitted.
+    pub fn get(&self, i: impl Which) -> &'a Value {
+        let i = i.position(&self.builtin.args);
         match self.values.get(i) {
             Some(v) if !matches!(v, Value::Unit) => v,
             _ => self.builtin.args.get(i).map_or(&Value::Unit, |a| &a.value),
         }
     }
 
-    /// Whether argument `i` has a value, from the call or from the table's default.
-    pub fn given(&self, i: usize) -> bool {
+    /// Returns whether the call itself gives an argument.
+    pub fn is_written(&self, i: impl Which) -> bool {
+        let value = self.values.get(i.position(&self.builtin.args));
+        value.is_some_and(|v| !matches!(v, Value::Unit))
+    }
+
+    /// Returns whether an argument has a value, from the call or by default.
+    pub fn given(&self, i: impl Which) -> bool {
         !matches!(self.get(i), Value::Unit)
     }
 
-    fn name(&self, i: usize) -> &'a str {
-        self.builtin.args.get(i).or(self.builtin.args.last()).map_or("argument", |a| &a.name)
+    fn declared(&self, i: impl Which) -> Option<&'a Argument> {
+        let args = &self.builtin.args;
+        args.get(i.position(args)).or(args.last())
+    }
+
+    fn name(&self, i: impl Which) -> &'a str {
+        self.declared(i).map_or("argument", |a| &a.name)
+    }
+
+    fn domain(&self, i: impl Which) -> Domain {
+        self.declared(i).map_or(Domain::Any, |a| a.domain)
     }
 
     /// The error that argument `i` does not have the required type.
-    pub fn wrong(&self, i: usize, wanted: &str) -> Fault {
+    pub fn wrong(&self, i: impl Which, wanted: &str) -> Fault {
         let got = described(self.get(i));
         Fault::type_error(format!(
             "{}: `{}` must be {wanted}, got {got}",
@@ -38,7 +75,7 @@ impl<'a> Args<'a> {
     }
 
     /// The error that argument `i` is an array with an unsuitable element.
-    pub fn element_wrong(&self, i: usize, wanted: &str, found: &Value) -> Fault {
+    pub fn element_wrong(&self, i: impl Which, wanted: &str, found: &Value) -> Fault {
         let (name, got) = (self.builtin.full_name(), described(found));
         Fault::type_error(format!(
             "{name}: `{}` must be {wanted}, got an array with {got} in it",
@@ -47,39 +84,37 @@ impl<'a> Args<'a> {
     }
 
     /// The error that argument `i` has the wrong length.
-    pub fn wrong_length(&self, i: usize, wanted: &str) -> Fault {
+    pub fn wrong_length(&self, i: impl Which, wanted: &str) -> Fault {
         let (name, got) = (self.builtin.full_name(), self.get(i).len().unwrap_or(0));
         Fault::type_error(format!("{name}: `{}` must have {wanted}, got {got}", self.name(i)))
     }
 
     /// The error that argument `i` is outside its domain.
-    pub fn outside(&self, i: usize, rule: &str) -> Fault {
+    pub fn outside(&self, i: impl Which, rule: &str) -> Fault {
         let (name, got) = (self.builtin.full_name(), self.get(i));
         Fault::domain(format!("{name}: `{}` must be {rule}, got {got}", self.name(i)))
     }
 
     /// Reads a number.
-    pub fn num(&self, i: usize) -> Result<f64, Fault> {
-        match self.get(i) {
-            Value::Num(x) => Ok(*x),
-            _ => Err(self.wrong(i, "a number")),
-        }
+    pub fn num(&self, i: impl Which) -> Result<f64, Fault> {
+        let Value::Num(x) = self.get(i) else { return Err(self.wrong(i, "a number")) };
+        let domain = self.domain(i);
+        if domain.holds(*x) { Ok(*x) } else { Err(self.outside(i, &domain.to_string())) }
     }
 
-    /// Reads a number, or returns a default.
-    pub fn num_or(&self, i: usize, default: f64) -> Result<f64, Fault> {
-        if self.given(i) { self.num(i) } else { Ok(default) }
+    /// Reads a number, if there is one.
+    pub fn num_if_given(&self, i: impl Which) -> Result<Option<f64>, Fault> {
+        if self.given(i) { self.num(i).map(Some) } else { Ok(None) }
     }
 
-    /// Reads a positive, finite number, or returns a default.
-    pub fn positive_or(&self, i: usize, default: f64) -> Result<f64, Fault> {
-        let x = self.num_or(i, default)?;
-        if x > 0.0 && x.is_finite() { Ok(x) } else { Err(self.outside(i, "positive and finite")) }
+    /// Reads a whole number within the declared bounds.
+    pub fn int(&self, i: impl Which) -> Result<u32, Fault> {
+        self.num(i).map(|x| x as u32)
     }
 
     /// Reads a whole number within bounds.
-    pub fn int_in(&self, i: usize, lo: i64, hi: i64) -> Result<i64, Fault> {
-        let x = self.num(i)?;
+    pub fn int_in(&self, i: impl Which, lo: i64, hi: i64) -> Result<i64, Fault> {
+        let Value::Num(x) = *self.get(i) else { return Err(self.wrong(i, "a number")) };
         if x == libm::trunc(x) && x >= lo as f64 && x <= hi as f64 {
             return Ok(x as i64);
         }
@@ -89,40 +124,38 @@ impl<'a> Args<'a> {
         })
     }
 
-    /// Reads a truth value, or returns a default.
-    pub fn bool_or(&self, i: usize, default: bool) -> Result<bool, Fault> {
+    /// Reads a truth value.
+    pub fn bool(&self, i: impl Which) -> Result<bool, Fault> {
         match self.get(i) {
-            Value::Unit => Ok(default),
             Value::Bool(b) => Ok(*b),
             _ => Err(self.wrong(i, "a bool")),
         }
     }
 
     /// Reads a string.
-    pub fn str(&self, i: usize) -> Result<&'a str, Fault> {
+    pub fn str(&self, i: impl Which) -> Result<&'a str, Fault> {
         match self.get(i) {
             Value::Str(s) => Ok(s),
             _ => Err(self.wrong(i, "a string")),
         }
     }
 
-    /// Reads a string that must be one of `options`; the first of them if it is omitted.
-    pub fn choice<'b>(&self, i: usize, options: &'b [&'b str]) -> Result<&'b str, Fault> {
-        if !self.given(i) {
-            return Ok(options.first().copied().unwrap_or_default());
-        }
+    /// Reads one of the declared words.
+    pub fn word(&self, i: impl Which) -> Result<&'static str, Fault> {
         let s = self.str(i)?;
-        options.iter().copied().find(|o| *o == s).ok_or_else(|| {
-            let mut f = self.wrong(i, &format!("one of {}", quoted(options)));
-            if let Some(n) = pcadlang_syntax::diag::nearest(s, options.iter().copied()) {
-                f = f.with_hint(format!("did you mean \"{n}\"?"));
+        let domain = self.domain(i);
+        let words = if let Domain::Words(words) = domain { words } else { &[] };
+        words.iter().copied().find(|word| *word == s).ok_or_else(|| {
+            let f = self.wrong(i, &domain.to_string());
+            match pcadlang_syntax::diag::nearest(s, words.iter().copied()) {
+                Some(near) => f.with_hint(format!("did you mean \"{near}\"?")),
+                None => f,
             }
-            f
         })
     }
 
     /// Reads an array of numbers.
-    pub fn array(&self, i: usize) -> Result<Arc<[f64]>, Fault> {
+    pub fn array(&self, i: impl Which) -> Result<Arc<[f64]>, Fault> {
         match self.get(i) {
             Value::Array(xs) => Ok(Arc::clone(xs)),
             Value::List(xs) if xs.is_empty() => Ok(Arc::from([])),
@@ -131,7 +164,7 @@ impl<'a> Args<'a> {
     }
 
     /// Reads an array of numbers or bools, which count as 0 and 1.
-    pub fn numbers(&self, i: usize) -> Result<Cow<'a, [f64]>, Fault> {
+    pub fn numbers(&self, i: impl Which) -> Result<Cow<'a, [f64]>, Fault> {
         match self.get(i) {
             Value::Array(xs) => Ok(Cow::Borrowed(xs)),
             Value::List(xs) => {
@@ -145,7 +178,7 @@ impl<'a> Args<'a> {
     }
 
     /// Reads an array of at least `least` numbers.
-    pub fn numbers_from(&self, i: usize, least: usize) -> Result<Cow<'a, [f64]>, Fault> {
+    pub fn numbers_from(&self, i: impl Which, least: usize) -> Result<Cow<'a, [f64]>, Fault> {
         let xs = self.numbers(i)?;
         if xs.len() >= least {
             return Ok(xs);
@@ -155,7 +188,11 @@ impl<'a> Args<'a> {
     }
 
     /// Reads two arrays of numbers of equal length.
-    pub fn number_pair(&self, i: usize, j: usize) -> Result<(Numbers<'a>, Numbers<'a>), Fault> {
+    pub fn number_pair(
+        &self,
+        i: impl Which,
+        j: impl Which,
+    ) -> Result<(Numbers<'a>, Numbers<'a>), Fault> {
         let (x, y) = (self.numbers(i)?, self.numbers(j)?);
         if x.len() == y.len() {
             return Ok((x, y));
@@ -164,7 +201,7 @@ impl<'a> Args<'a> {
     }
 
     /// Reads the number of elements of an array to create.
-    pub fn count(&self, i: usize) -> Result<usize, Fault> {
+    pub fn count(&self, i: impl Which) -> Result<usize, Fault> {
         let n = self.int_in(i, 0, i64::MAX)? as usize;
         if n <= MOST_ELEMENTS { Ok(n) } else { Err(self.too_many(n as f64)) }
     }
@@ -191,19 +228,19 @@ impl<'a> Args<'a> {
             .with_hint(format!("at most {MOST_ELEMENTS} can be made in one call"))
     }
 
-    /// Reads a vector of three numbers, or one number for all three, or returns a
-    /// default.
-    pub fn vec3_or(&self, i: usize, default: [f64; 3]) -> Result<[f64; 3], Fault> {
+    /// Reads a vector of three numbers, or one number for all three.
+    pub fn vec3(&self, i: impl Which) -> Result<[f64; 3], Fault> {
         match self.get(i) {
-            Value::Unit => Ok(default),
             Value::Num(x) => Ok([*x; 3]),
-            Value::Array(xs) if xs.len() == 3 => Ok([xs[0], xs[1], xs[2]]),
-            _ => Err(self.wrong(i, "three numbers [x, y, z], or one for all of them")),
+            _ => match self.array(i)?[..] {
+                [x, y, z] => Ok([x, y, z]),
+                _ => Err(self.wrong_length(i, "3 numbers")),
+            },
         }
     }
 
     /// Reads the elements of an array of any type.
-    pub fn elements(&self, i: usize) -> Result<Cow<'a, [Value]>, Fault> {
+    pub fn elements(&self, i: impl Which) -> Result<Cow<'a, [Value]>, Fault> {
         match self.get(i) {
             Value::List(xs) => Ok(Cow::Borrowed(xs)),
             Value::Array(xs) => Ok(Cow::Owned(xs.iter().map(|x| Value::Num(*x)).collect())),
@@ -212,7 +249,7 @@ impl<'a> Args<'a> {
     }
 
     /// Reads a record.
-    pub fn record(&self, i: usize) -> Result<&'a Record, Fault> {
+    pub fn record(&self, i: impl Which) -> Result<&'a Record, Fault> {
         match self.get(i) {
             Value::Record(r) => Ok(r),
             _ => Err(self.wrong(i, "a record")),
@@ -220,7 +257,7 @@ impl<'a> Args<'a> {
     }
 
     /// Reads an object of type `T`; `wanted` describes it in messages.
-    pub fn object<T: Object>(&self, i: usize, wanted: &str) -> Result<&'a T, Fault> {
+    pub fn object<T: Object>(&self, i: impl Which, wanted: &str) -> Result<&'a T, Fault> {
         self.get(i).downcast::<T>().ok_or_else(|| self.wrong(i, wanted))
     }
 }
@@ -241,8 +278,4 @@ fn described(v: &Value) -> String {
         Value::Str(s) if s.chars().count() <= 40 => format!("{} ({v})", v.type_name()),
         v => v.type_name().to_owned(),
     }
-}
-
-fn quoted(options: &[&str]) -> String {
-    options.iter().map(|o| format!("\"{o}\"")).collect::<Vec<_>>().join(", ")
 }

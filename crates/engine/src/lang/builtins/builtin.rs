@@ -76,6 +76,62 @@ impl fmt::Display for Type {
     }
 }
 
+/// The values of its type that an argument takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Domain {
+    /// All of them.
+    Any,
+    /// Positive, finite numbers.
+    Positive,
+    /// Finite numbers, at least 0.
+    NotNegative,
+    /// Numbers within bounds.
+    From([f64; 2]),
+    /// Numbers above 0 and below 1.
+    Between01,
+    /// Numbers from 0 and below 1.
+    Below1,
+    /// Whole numbers within bounds.
+    Whole([u32; 2]),
+    /// Some words.
+    Words(&'static [&'static str]),
+}
+
+impl Domain {
+    /// Returns whether a number is within.
+    pub fn holds(self, x: f64) -> bool {
+        match self {
+            Domain::Any | Domain::Words(_) => true,
+            Domain::Positive => x > 0.0 && x.is_finite(),
+            Domain::NotNegative => x >= 0.0 && x.is_finite(),
+            Domain::From([low, high]) => (low..=high).contains(&x),
+            Domain::Between01 => x > 0.0 && x < 1.0,
+            Domain::Below1 => (0.0..1.0).contains(&x),
+            Domain::Whole([low, high]) => {
+                x == libm::trunc(x) && x >= f64::from(low) && x <= f64::from(high)
+            }
+        }
+    }
+}
+
+impl fmt::Display for Domain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Domain::Any => f.write_str("any"),
+            Domain::Positive => f.write_str("positive and finite"),
+            Domain::NotNegative => f.write_str("not negative and finite"),
+            Domain::From([low, high]) => write!(f, "from {low} to {high}"),
+            Domain::Between01 => f.write_str("strictly between 0 and 1"),
+            Domain::Below1 => f.write_str("from 0 to less than 1"),
+            Domain::Whole([low, high]) => write!(f, "a whole number from {low} to {high}"),
+            Domain::Words(words) => {
+                let quoted: Vec<String> = words.iter().map(|w| format!("\"{w}\"")).collect();
+                write!(f, "one of {}", quoted.join(", "))
+            }
+        }
+    }
+}
+
 /// One argument.
 #[derive(Clone, Debug)]
 pub struct Argument {
@@ -83,6 +139,8 @@ pub struct Argument {
     pub name: Text,
     /// Its type.
     pub ty: Type,
+    /// The values of that type that it takes.
+    pub domain: Domain,
     /// Its unit, or empty.
     pub unit: Text,
     /// The default as shown in the reference; `None` for a required argument.
@@ -105,7 +163,7 @@ pub enum Form {
     LogLikelihood,
 }
 
-/// What a name of inference blocks stands for.
+/// The meaning of a name of inference blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum PlanForm {
@@ -125,10 +183,10 @@ pub enum PlanForm {
     Reported,
 }
 
-/// What static checks know of a kernel.
+/// The properties of a kernel that static checks use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct KernelTraits {
-    /// Whether a step is something else than a reversible move of one state.
+    /// A step is not a reversible move of one state.
     pub irreversible: bool,
     /// For a kernel that applies only reversible ones: a call of it, as an example.
     pub of_reversible: Option<&'static str>,
@@ -295,7 +353,7 @@ pub struct Builtin {
     pub section: Text,
     /// Its arguments in order.
     pub args: Arc<[Argument]>,
-    /// Whether the last argument may be repeated.
+    /// The last argument may be repeated.
     pub variadic: bool,
     /// The type of the result.
     pub returns: Type,
@@ -305,7 +363,7 @@ pub struct Builtin {
     pub kind: Kind,
     /// Its action on single numbers.
     pub scalar: Option<Scalar>,
-    /// What a draw is, of a family of distributions.
+    /// The type of a draw from a family of distributions.
     pub drawn: Drawn,
     /// Its derivative.
     pub derivative: Derivative,

@@ -1,6 +1,6 @@
 //! Covariance functions of Gaussian processes as values: `sq_exp(0.5) + white(0.01)`.
 
-use super::{Arg, ArgAdjoints, Args, Row, Type, arg, function, opt};
+use super::{Arg, ArgAdjoints, Args, Row, Type, arg, function, num};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::Fault;
 use crate::lang::value::{Object, Value};
@@ -25,7 +25,7 @@ impl Object for CovarianceValue {
         self
     }
 
-    fn multiply(&self, other: &Value) -> Option<Result<Value, String>> {
+    fn multiply(&self, other: &Value) -> Option<Result<Value, Fault>> {
         let other = other.downcast::<CovarianceValue>()?;
         Some(Self::joined(&self.0, &other.0, |x, y| x * y))
     }
@@ -45,7 +45,7 @@ impl CovarianceValue {
     }
 
     /// Returns the sum of two covariance functions; `None` if `x` or `y` is not one.
-    pub(super) fn sum(x: &Value, y: &Value) -> Option<Result<Value, String>> {
+    pub(super) fn sum(x: &Value, y: &Value) -> Option<Result<Value, Fault>> {
         let (x, y) = (x.downcast::<CovarianceValue>()?, y.downcast::<CovarianceValue>()?);
         Some(Self::joined(&x.0, &y.0, |x, y| x + y))
     }
@@ -54,15 +54,16 @@ impl CovarianceValue {
         x: &Covariance,
         y: &Covariance,
         join: fn(Covariance, Covariance) -> Covariance,
-    ) -> Result<Value, String> {
+    ) -> Result<Value, Fault> {
         if x.param_count() + y.param_count() > MOST_PARAMS {
-            return Err(format!("a covariance of more than {MOST_PARAMS} parameters"));
+            let message = format!("a covariance of more than {MOST_PARAMS} parameters");
+            return Err(Fault::domain(message));
         }
         Ok(Value::object(CovarianceValue(join(x.clone(), y.clone()))))
     }
 }
 
-const SD: Arg = opt("sd", Type::Num, "1", "The standard deviation.");
+const SD: Arg = num("sd", 1.0, "The standard deviation.");
 const LENGTH: Arg = arg("length", Type::Num, "The length scale, in units of the points.");
 
 const fn covariance(
@@ -79,19 +80,19 @@ pub(super) const TABLE: &[Row] = &[
         "sq_exp",
         &[LENGTH, SD],
         "Squared exponential, `sd^2 exp(-(x - y)^2 / (2 length^2))`: very smooth functions.",
-        |a| value(Covariance::sq_exp(a.num(0)?, a.num_or(1, 1.0)?)),
+        |a| value(Covariance::sq_exp(a.num(0)?, a.num(1)?)),
     ),
     covariance(
         "matern32",
         &[LENGTH, SD],
         "Matérn with nu = 3/2: once-differentiable functions.",
-        |a| value(Covariance::matern32(a.num(0)?, a.num_or(1, 1.0)?)),
+        |a| value(Covariance::matern32(a.num(0)?, a.num(1)?)),
     ),
     covariance(
         "matern52",
         &[LENGTH, SD],
         "Matérn with nu = 5/2: twice-differentiable functions.",
-        |a| value(Covariance::matern52(a.num(0)?, a.num_or(1, 1.0)?)),
+        |a| value(Covariance::matern52(a.num(0)?, a.num(1)?)),
     ),
     covariance(
         "periodic",
@@ -101,13 +102,13 @@ pub(super) const TABLE: &[Row] = &[
             SD,
         ],
         "Periodic, `sd^2 exp(-2 sin^2(pi (x - y) / period) / length^2)`.",
-        |a| value(Covariance::periodic(a.num(0)?, a.num(1)?, a.num_or(2, 1.0)?)),
+        |a| value(Covariance::periodic(a.num(0)?, a.num(1)?, a.num(2)?)),
     ),
     covariance(
         "white",
         &[SD],
         "Independent noise at every point; add it to another: `sq_exp(2) + white(0.1)`.",
-        |a| value(Covariance::white(a.num_or(0, 1.0)?)),
+        |a| value(Covariance::white(a.num(0)?)),
     ),
 ];
 

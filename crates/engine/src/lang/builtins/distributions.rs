@@ -13,7 +13,7 @@ use self::parameter_fault::{fault, made};
 use super::covariance::CovarianceValue;
 use super::elementwise::array_len;
 use super::linear::matrix::Matrix;
-use super::{Args, Argument, Builtin, Kind, Row, Scalar, Type};
+use super::{Args, Argument, Builtin, Domain, Kind, Row, Scalar, Type};
 use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use pcadlang_numerics::dist::{self, Dist, FAMILIES, Family, ParamDoc, ParamError, ParamKind};
@@ -86,22 +86,28 @@ fn builtin(f: &Family) -> Builtin {
 }
 
 fn argument(p: &ParamDoc) -> Argument {
-    let (ty, value) = match p.kind {
-        ParamKind::Numbers => (Type::Nums, p.default.and_then(|d| d.parse().ok()).map(Value::Num)),
-        ParamKind::Number => (Type::Num, None),
-        ParamKind::Integer => (Type::Int, None),
-        ParamKind::Bool => (Type::Bool, None),
-        ParamKind::Array => (Type::Array, None),
-        ParamKind::Distribution => (Type::Dist, None),
-        ParamKind::Covariance => (Type::Covariance, None),
-        ParamKind::Any => (Type::Any, None),
+    let ty = match p.kind {
+        ParamKind::Numbers => Type::Nums,
+        ParamKind::Number => Type::Num,
+        ParamKind::Integer => Type::Int,
+        ParamKind::Bool => Type::Bool,
+        ParamKind::Array => Type::Array,
+        ParamKind::Distribution => Type::Dist,
+        ParamKind::Covariance => Type::Covariance,
+        ParamKind::Any => Type::Any,
+    };
+    let value = |text: &str| match ty {
+        Type::Bool => Value::Bool(text == "true"),
+        Type::Nums | Type::Num => text.parse().map_or(Value::Unit, Value::Num),
+        _ => Value::Unit,
     };
     Argument {
         name: p.name.into(),
         ty,
+        domain: Domain::Any,
         unit: p.unit.into(),
         default: p.default.map(Into::into),
-        value: value.unwrap_or_default(),
+        value: p.default.map(value).unwrap_or_default(),
         doc: p.doc.into(),
     }
 }
@@ -221,7 +227,7 @@ fn product(
 }
 
 fn mv_normal(a: &Args) -> Result<Dist, Fault> {
-    let whitened = a.bool_or(3, false)?;
+    let whitened = a.bool(3)?;
     let mean = a.array(0)?;
     let d = match (a.given(1), a.given(2)) {
         (true, false) => dist::MvNormal::from_cov(&mean, &square(a, 1, mean.len())?),
@@ -255,7 +261,7 @@ fn gp(a: &Args) -> Result<Dist, Fault> {
             a.wrong_length(0, &format!("as many elements as there are points, {}", at.len()))
         );
     }
-    let centred = a.bool_or(3, false)?;
-    let jitter = a.num_or(4, dist::JITTER)?;
+    let centred = a.bool(3)?;
+    let jitter = a.num(4)?;
     made(dist::Gp::with_jitter(mean, cov, &at, centred, jitter))
 }

@@ -1,7 +1,7 @@
 //! Creating, joining and searching arrays and records; truth tests over arrays; strings.
 
 use super::elementwise::{array, array_len, common_len, part};
-use super::{Arg, ArgAdjoints, Args, Row, Type, arg, function, opt};
+use super::{Arg, ArgAdjoints, Args, Row, Type, arg, function, num};
 use crate::lang::adjoint::Adjoint;
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::key::Key;
@@ -57,7 +57,7 @@ pub(super) const TABLE: &[Row] = &[
         &[
             arg("start", Type::Num, "The first number."),
             arg("end", Type::Num, "The end, excluded."),
-            opt("step", Type::Num, "1", "The step, not 0; may be negative."),
+            num("step", 1.0, "The step, not 0; may be negative."),
         ],
         Type::Array,
         "`start`, `start + step`, … up to but excluding `end`; for whole numbers write `a .. b`.",
@@ -275,7 +275,7 @@ fn linspace(a: &Args) -> Result<Value, Fault> {
 }
 
 fn range(a: &Args) -> Result<Value, Fault> {
-    let (start, end, step) = (a.num(0)?, a.num(1)?, a.num_or(2, 1.0)?);
+    let (start, end, step) = (a.num(0)?, a.num(1)?, a.num(2)?);
     let n = libm::ceil((end - start) / step);
     if n.is_nan() || step == 0.0 {
         return Err(Fault::domain(format!(

@@ -28,14 +28,14 @@ mod reduce;
 mod row;
 mod table;
 
+pub use args::Which;
 pub use builtin::{
-    ArgAdjoints, Args, Argument, Binary, Builtin, Derivative, Form, HostItem, KernelTraits, Kind,
-    PlanForm, PreviousEvaluation, Reduction, Scalar, State, Text, Type, Vjp,
+    ArgAdjoints, Args, Argument, Binary, Builtin, Derivative, Domain, Form, HostItem, KernelTraits,
+    Kind, PlanForm, PreviousEvaluation, Reduction, Scalar, State, Text, Type, Vjp,
 };
 pub use covariance::CovarianceValue;
 pub(crate) use derivative::times;
 pub use finding::{doc, search};
 pub(crate) use reduce::dot;
-pub use row::Resume;
-pub use row::{Arg, Row, arg, function, opt};
+pub use row::{Arg, Default, Resume, Row, arg, flag, function, int, num, opt, word};
 pub use table::{Constant, Defaults, InputHook, Table};

@@ -125,7 +125,7 @@ fn add(a: &Args) -> Result<Value, Fault> {
             Ok(Value::Str(format!("{x}{y}").into()))
         }
         _ => match CovarianceValue::sum(x, y) {
-            Some(sum) => sum.map_err(Fault::domain),
+            Some(sum) => sum,
             None => Err(unsuited(a, "numbers or strings", x, y)),
         },
     })
@@ -134,10 +134,7 @@ fn add(a: &Args) -> Result<Value, Fault> {
 fn multiply(a: &Args) -> Result<Value, Fault> {
     numeric(a, a.get(0), a.get(1), elementwise::of_two(a), &|x, y| {
         let product = if let Value::Object(o) = x { o.multiply(y) } else { None };
-        match product {
-            Some(p) => p.map_err(Fault::type_error),
-            None => Err(unsuited(a, "numbers", x, y)),
-        }
+        product.unwrap_or_else(|| Err(unsuited(a, "numbers", x, y)))
     })
 }
 

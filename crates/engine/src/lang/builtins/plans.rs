@@ -1,7 +1,7 @@
 //! Names that exist only in inference blocks, user kernels and reports: selections, starts,
 //! monitors. They are not values of the model.
 
-use super::{Arg, Kind, PlanForm, Row, Type, arg, opt};
+use super::{Arg, Default, Kind, PlanForm, Row, Type, arg, opt};
 
 const CHOICES: &str = "Selections and starts";
 const MONITORS: &str = "Monitors and reports";
@@ -61,7 +61,7 @@ pub(super) const TABLE: &[Row] = &[
         PlanForm::Prior,
         "prior",
         CHOICES,
-        &[opt("n", Type::Int, "1", "The number of draws.")],
+        &[arg("n", Type::Int, "The number of draws.").or(Default::Num(1.0))],
         Type::Kernel,
         "A start drawn from the prior: one of `n` draws, with probability proportional to its \
          likelihood, so that chains start apart.",
@@ -70,7 +70,7 @@ pub(super) const TABLE: &[Row] = &[
         PlanForm::Unconstrained,
         "unconstrained",
         CHOICES,
-        &[opt("n", Type::Int, "4", "The number of restarts.")],
+        &[arg("n", Type::Int, "The number of restarts.").or(Default::Num(4.0))],
         Type::Kernel,
         "A start for vague priors, as in Stan: continuous choices are uniform on (-2, 2) in the \
          unconstrained space, others are drawn from the prior; where that is impossible the \
@@ -84,12 +84,7 @@ pub(super) const TABLE: &[Row] = &[
         CHOICES,
         &[
             arg("n", Type::Int, "The number of draws from the prior."),
-            opt(
-                "keep",
-                Type::Int,
-                "1",
-                "The number of best draws to start a population, which `anneal` reduces to one state.",
-            ),
+            arg("keep", Type::Int, "The number of best draws to start a population, which `anneal` reduces to one state.").or(Default::Num(1.0)),
             opt(
                 "from",
                 Type::Kernel,

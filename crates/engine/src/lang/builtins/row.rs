@@ -2,8 +2,8 @@
 //! converted to entries of the table.
 
 use super::builtin::{
-    Args, Argument, Builtin, Derivative, HostItem, Kind, PreviousEvaluation, Scalar, State, Type,
-    Vjp,
+    Args, Argument, Builtin, Derivative, Domain, HostItem, Kind, PreviousEvaluation, Scalar, State,
+    Text, Type, Vjp,
 };
 use super::call::call_host;
 use super::data::DataFormat;
@@ -17,30 +17,111 @@ use std::sync::Arc;
 pub struct Arg {
     /// Its name, by which calls may give it.
     pub name: &'static str,
-    /// What it takes.
+    /// Its type.
     pub ty: Type,
+    /// The values of that type that it takes.
+    pub domain: Domain,
     /// The unit of its numbers, for the reference.
     pub unit: &'static str,
-    /// The text of its default, if it may be left out.
-    pub default: Option<&'static str>,
+    /// Its default, if it may be left out.
+    pub default: Option<Default>,
     /// A sentence for the reference.
     pub doc: &'static str,
 }
 
-/// A required argument.
-pub const fn arg(name: &'static str, ty: Type, doc: &'static str) -> Arg {
-    Arg { name, ty, unit: "", default: None, doc }
+/// The default of an argument.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub enum Default {
+    Num(f64),
+    Bool(bool),
+    Str(&'static str),
+    Nums(&'static [f64]),
+    /// Supplied by the run or the function; the reference describes it by this text.
+    Described(&'static str),
 }
 
-/// An optional argument with its default.
+impl Default {
+    /// Its text in the reference, with at most four significant digits, and its value.
+    fn entry(self) -> (Text, Value) {
+        let shown = |value: Value| (Text::Owned(value.to_string()), value);
+        match self {
+            Default::Num(x) => {
+                let rounded = format!("{x:.3e}").parse().map_or(x, |x: f64| x);
+                (Value::Num(rounded).to_string().into(), Value::Num(x))
+            }
+            Default::Bool(b) => shown(Value::Bool(b)),
+            Default::Str(s) => shown(Value::str(s)),
+            Default::Nums(xs) => shown(Value::array(xs)),
+            Default::Described(text) => (text.into(), Value::Unit),
+        }
+    }
+}
+
+/// A required argument.
+pub const fn arg(name: &'static str, ty: Type, doc: &'static str) -> Arg {
+    Arg { name, ty, domain: Domain::Any, unit: "", default: None, doc }
+}
+
+/// An optional argument whose default the run or the function supplies.
 pub const fn opt(name: &'static str, ty: Type, default: &'static str, doc: &'static str) -> Arg {
-    Arg { name, ty, unit: "", default: Some(default), doc }
+    arg(name, ty, doc).or(Default::Described(default))
+}
+
+/// An optional number.
+pub const fn num(name: &'static str, default: f64, doc: &'static str) -> Arg {
+    arg(name, Type::Num, doc).or(Default::Num(default))
+}
+
+/// An optional whole number within bounds.
+pub const fn int(name: &'static str, default: u32, bounds: [u32; 2], doc: &'static str) -> Arg {
+    arg(name, Type::Int, doc).or(Default::Num(default as f64)).within(Domain::Whole(bounds))
+}
+
+/// An optional truth value, false by default.
+pub const fn flag(name: &'static str, doc: &'static str) -> Arg {
+    arg(name, Type::Bool, doc).or(Default::Bool(false))
+}
+
+/// An optional word, by default the first of them.
+pub const fn word(name: &'static str, words: &'static [&'static str], doc: &'static str) -> Arg {
+    arg(name, Type::Str, doc).or(Default::Str(words[0])).within(Domain::Words(words))
 }
 
 impl Arg {
+    /// Adds a default.
+    pub const fn or(self, default: Default) -> Arg {
+        Arg { default: Some(default), ..self }
+    }
+
     /// Adds a unit.
     pub const fn unit(self, unit: &'static str) -> Arg {
         Arg { unit, ..self }
+    }
+
+    /// Restricts its values.
+    pub const fn within(self, domain: Domain) -> Arg {
+        Arg { domain, ..self }
+    }
+
+    /// Takes positive, finite numbers only.
+    pub const fn positive(self) -> Arg {
+        self.within(Domain::Positive)
+    }
+}
+
+impl From<&Arg> for Argument {
+    fn from(a: &Arg) -> Argument {
+        let (default, value) = a.default.map(Default::entry).unzip();
+        Argument {
+            name: a.name.into(),
+            ty: a.ty,
+            domain: a.domain,
+            unit: a.unit.into(),
+            default,
+            value: value.unwrap_or_default(),
+            doc: a.doc.into(),
+        }
     }
 }
 
@@ -59,13 +140,13 @@ pub struct Row {
     pub section: &'static str,
     /// Its arguments, in the order of a call.
     pub args: &'static [Arg],
-    /// Whether the last argument may be repeated.
+    /// The last argument may be repeated.
     pub variadic: bool,
-    /// What it returns.
+    /// The type of its result.
     pub returns: Type,
-    /// What the reference says of it.
+    /// Its text in the reference.
     pub doc: &'static str,
-    /// What it is, and how it is evaluated.
+    /// Its kind, with its evaluation.
     pub kind: Kind,
     /// The same function of numbers, if there is one.
     pub scalar: Option<Scalar>,
@@ -158,19 +239,11 @@ impl Row {
 
 impl From<&Row> for Builtin {
     fn from(r: &Row) -> Builtin {
-        let argument = |a: &Arg| Argument {
-            name: a.name.into(),
-            ty: a.ty,
-            unit: a.unit.into(),
-            default: a.default.map(Into::into),
-            value: Value::Unit,
-            doc: a.doc.into(),
-        };
         Builtin {
             name: r.name.into(),
             module: r.module.into(),
             section: r.section.into(),
-            args: r.args.iter().map(argument).collect(),
+            args: r.args.iter().map(Argument::from).collect(),
             variadic: r.variadic,
             returns: r.returns,
             doc: r.doc.into(),

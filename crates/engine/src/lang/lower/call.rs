@@ -4,8 +4,10 @@
 use super::lowerer::{AddHint, Lowerer, Typed};
 use super::scope::Meaning;
 use super::types::{accepts, shown};
-use crate::lang::builtins::{Form, Kind, Type};
+use crate::lang::builtins::data::Literal;
+use crate::lang::builtins::{Args, Builtin, Domain, Form, Kind, Type};
 use crate::lang::code::{BlockKind, Callee, Op, Operand, Probe};
+use crate::lang::fault::Fault;
 use crate::lang::value::Value;
 use pcadlang_syntax::ast::{Arg, Expr, ExprKind};
 use pcadlang_syntax::span::Span;
@@ -242,6 +244,9 @@ impl Lowerer<'_> {
                         } else {
                             e.hint_also(b.signature());
                         }
+                    } else if let Some(fault) = refused(b, p, &args[*j].value) {
+                        let e = self.error(fault.message, args[*j].value.span, "not allowed here");
+                        e.hint_also(fault.hint.unwrap_or_else(|| b.signature()));
                     }
                     operands.push(v.at);
                 }
@@ -385,5 +390,22 @@ impl Lowerer<'_> {
             )
             .hint_also(signature);
         }
+    }
+}
+
+/// The fault of a number or word that is written where its argument does not take it.
+fn refused(b: &Builtin, p: usize, written: &Expr) -> Option<Fault> {
+    let domain = b.args.get(p)?.domain;
+    let value = match Literal::of(written) {
+        Literal::Num(x) => Value::Num(x),
+        Literal::Str(s) => Value::Str(s),
+        _ => return None,
+    };
+    let values: Vec<&Value> = (0..=p).map(|i| if i == p { &value } else { &Value::Unit }).collect();
+    let a = Args { builtin: b, values: &values };
+    match domain {
+        Domain::Any => None,
+        Domain::Words(_) => a.word(p).err(),
+        _ => a.num(p).err(),
     }
 }

@@ -3,20 +3,20 @@
 
 use super::kernel::{DIVERGENT, End, Hamiltonian, Path, Trajectory};
 use crate::kernel::{SiteSelection, accepts};
-use crate::kernels::row::{KernelRow, MARGINAL, SEL, Type, number, opt};
+use crate::kernels::row::{KernelRow, MARGINAL, SEL, int, number};
 use pcadlang_engine::trace::TraceResult;
 
 pub(crate) const ROW: KernelRow = KernelRow::new(
     "hmc",
-    &[SEL, opt("steps", Type::Int, "10", "The number of leapfrog steps per proposal."), MARGINAL],
+    &[SEL, int("steps", 10, [1, 10_000], "The number of leapfrog steps per proposal."), MARGINAL],
     "Hamiltonian Monte Carlo; step size and metric are adapted in warm-up (Neal 2011).",
     number!(
         "infer { warmup 200 { hmc(@x, steps = 5); } repeat 100 { hmc(@x, steps = 5); collect x; } }"
     ),
     |call| {
         call.moving(|scope, call| {
-            let steps = call.whole(1, 10, 1, 10_000)?;
-            Ok(Hmc::new(scope, steps, None).summing_out(call.marginal(2)?))
+            let steps = call.whole("steps")?;
+            Ok(Hmc::new(scope, steps, None).summing_out(call.marginal()?))
         })
     },
 );

@@ -8,5 +8,5 @@ pub(crate) const ROW: KernelRow = KernelRow::new(
     &[SEL, MARGINAL],
     "The Metropolis-adjusted Langevin algorithm: one gradient per proposal.",
     number!("infer { warmup 200 { mala(@x); } repeat 100 { mala(@x); collect x; } }"),
-    |call| call.moving(|scope, call| Ok(Hmc::new(scope, 1, None).summing_out(call.marginal(1)?))),
+    |call| call.moving(|scope, call| Ok(Hmc::new(scope, 1, None).summing_out(call.marginal()?))),
 );

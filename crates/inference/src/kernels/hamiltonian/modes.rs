@@ -14,7 +14,7 @@ use super::system::System;
 use crate::kernel::{
     Kernel, Outcome, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
 };
-use crate::kernels::row::{KernelRow, SEL, Type, number, opt};
+use crate::kernels::row::{KernelRow, SEL, Type, int, number, opt};
 use crate::state::{StateError, pack, unpack};
 use pcadlang_engine::trace::{Change, Constraint, Selector, Target, Trace, TraceResult};
 use pcadlang_numerics::dist::Datum;
@@ -25,19 +25,14 @@ pub(crate) const ROW: KernelRow = KernelRow::new(
     "modes",
     &[
         SEL,
-        opt(
+        int(
             "tries",
-            Type::Int,
-            "200",
+            200,
+            [1, 1_000_000],
             "The number of draws from the prior, from which starting points are chosen.",
         ),
-        opt(
-            "keep",
-            Type::Int,
-            "16",
-            "The number of these, the most probable, that climb to a mode.",
-        ),
-        opt("steps", Type::Int, "60", "The maximum number of optimisation steps per climb."),
+        int("keep", 16, [1, 1000], "The number of these, the most probable, that climb to a mode."),
+        int("steps", 60, [1, 1_000_000], "The maximum number of optimisation steps per climb."),
         opt(
             "first",
             Type::Selection,
@@ -63,11 +58,11 @@ pub(crate) const ROW: KernelRow = KernelRow::new(
     number!("infer { warmup 20 { modes(@x); } repeat 100 { modes(@x); collect x; } }"),
     |call| {
         call.moving(|scope, call| {
-            let tries = call.whole(1, 200, 1, 1_000_000)?;
-            let keep = call.whole(2, 16, 1, 1000)?;
-            let steps = call.whole(3, 60, 1, 1_000_000)?;
-            let modes = Modes::new(scope, tries, keep, steps).climbing_first(call.scope(4)?);
-            Ok(modes.by_surrogates_of(call.selector(5)?))
+            let tries = call.whole("tries")?;
+            let keep = call.whole("keep")?;
+            let steps = call.whole("steps")?;
+            let modes = Modes::new(scope, tries, keep, steps).climbing_first(call.scope("first")?);
+            Ok(modes.by_surrogates_of(call.selector("at")?))
         })
     },
 );

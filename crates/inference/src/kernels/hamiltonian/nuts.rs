@@ -6,7 +6,7 @@ use super::kernel::{DIVERGENT, End, Hamiltonian, Path, Trajectory};
 use super::point::Point;
 use super::system::System;
 use crate::kernel::SiteSelection;
-use crate::kernels::row::{KernelRow, MARGINAL, SEL, Type, number, opt};
+use crate::kernels::row::{KernelRow, MARGINAL, SEL, int, number};
 use pcadlang_engine::trace::TraceResult;
 use pcadlang_numerics::num::log_sum_exp;
 use pcadlang_numerics::rng::Stream;
@@ -16,10 +16,10 @@ pub(crate) const ROW: KernelRow = KernelRow::new(
     "nuts",
     &[
         SEL,
-        opt(
+        int(
             "max_depth",
-            Type::Int,
-            "10",
+            10,
+            [1, 20],
             "The maximum tree depth: at most 2^max_depth leapfrog steps.",
         ),
         MARGINAL,
@@ -28,8 +28,8 @@ pub(crate) const ROW: KernelRow = KernelRow::new(
     number!("infer { warmup 200 { nuts(@x); } repeat 100 { nuts(@x); collect x; } }"),
     |call| {
         call.moving(|scope, call| {
-            let depth = call.whole(1, 10, 1, 20)?;
-            Ok(Nuts::new(scope, depth).summing_out(call.marginal(2)?))
+            let depth = call.whole("max_depth")?;
+            Ok(Nuts::new(scope, depth).summing_out(call.marginal()?))
         })
     },
 );

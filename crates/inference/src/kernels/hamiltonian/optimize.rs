@@ -9,7 +9,7 @@ use super::memory::Memory;
 use super::point::Point;
 use super::system::System;
 use crate::kernel::{Kernel, Outcome, Registered, SiteSelection, StepContext};
-use crate::kernels::row::{KernelRow, SEL, Type, number, opt};
+use crate::kernels::row::{KernelRow, SEL, int, number};
 use crate::state::{StateError, pack, unpack};
 use pcadlang_engine::trace::{ChoiceKind, Selector, Trace, TraceResult};
 use std::collections::VecDeque;
@@ -17,10 +17,10 @@ use std::sync::Arc;
 
 pub(crate) const ROW: KernelRow = KernelRow::new(
     "optimize",
-    &[SEL, opt("steps", Type::Int, "100", "The number of gradient steps.")],
+    &[SEL, int("steps", 100, [1, 1_000_000], "The number of gradient steps.")],
     "Climbs to a mode of the posterior: for starting points or quick answers. Not a sampler.",
     number!("infer { repeat 10 { optimize(@x, steps = 20); collect x; } }"),
-    |call| call.moving(|scope, call| Ok(Optimize::new(scope, call.whole(1, 100, 1, 1_000_000)?))),
+    |call| call.moving(|scope, call| Ok(Optimize::new(scope, call.whole("steps")?))),
 )
 .irreversible();
 

@@ -1,7 +1,7 @@
 //! Vector-Jacobian products of bodies: from surfaces and keypoints to poses, shapes and
 //! proportions.
 
-use super::args::{armature, joint, pose, stops, stretches};
+use super::{armature, joint, pose, stops, stretches};
 use crate::scene::adjoints::{BySolid, armature_adjoint, by_armature, from_points, shaped as like};
 use crate::scene::objects::affine_adjoint;
 use crate::scene::{AffineValue, SolidValue};
@@ -20,7 +20,7 @@ pub(super) fn skin(a: &Args, posed: &Value, by: &Adjoint) -> Option<ArgAdjoints>
     let solid = &posed.downcast::<SolidValue>()?.0;
     let by = BySolid::read(by, solid);
     let vertices = if by.vertices.is_empty() { Vec::new() } else { body.vjp_parts(&by.vertices) };
-    let rules = Rules { stops: stops(a, body).ok()?, inherit_scale: a.bool_or(3, false).ok()? };
+    let rules = Rules { stops: stops(a, body).ok()?, inherit_scale: a.bool("inherit_scale").ok()? };
     let pose = pose(a, body).ok()?;
     if let Some(g) = body.vjp_posed(&pose, &rules, &by.landmarks, &vertices, solid.joints()).ok()? {
         let turned = |turn: DVec3| JointGradient { turn, ..JointGradient::default() };

@@ -1,17 +1,13 @@
 //! Shapes and placements.
 
-mod args;
 mod vjps;
 
-pub(super) use args::{vector, vector_of};
-
 use super::{AFFINE, AffineValue, SOLID, SolidValue, fault, native};
-use args::{LatheArgs, lathe_args};
 use glam::DVec3;
-use pcadlang_engine::lang::builtins::{Row, Type, arg, opt};
+use pcadlang_engine::lang::builtins::{Args, Default, Row, Type, arg, flag, int, num, word};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
-use pcadlang_scene::geom::{Affine, Landmark, Solid, cuboid, lathe, sphere};
+use pcadlang_scene::geom::{Affine, Caps, Landmark, Profile, Solid, Wall, cuboid, lathe, sphere};
 use std::sync::Arc;
 
 const SECTION: &str = "Shapes";
@@ -26,27 +22,12 @@ pub(super) const TABLE: &[Row] = &[
         &[
             arg("parts", Type::Any, "A profile `{ y: heights, r: radii }`, or an array of them, from the bottom up.")
                 .unit("scene units"),
-            opt(
-                "sides",
-                Type::Int,
-                "48",
-                "The number of flat sides, 3 to 1024; 0 for a round surface, drawn without a mesh where it is the \
-                 only object.",
-            ),
-            opt(
-                "thickness",
-                Type::Num,
-                "0",
-                "The thickness of the wall, for a vessel open at the top; 0 for a solid body.",
-            )
+            int("sides", 48, [0, 1024], "The number of flat sides, 3 to 1024; 0 for a round surface, drawn without a mesh where it is the \
+                 only object."),
+            num("thickness", 0.0, "The thickness of the wall, for a vessel open at the top; 0 for a solid body.")
             .unit("scene units"),
-            opt("caps", Type::Str, "\"both\"", "Which ends are closed: \"both\", \"bottom\", \"top\" or \"none\"."),
-            opt(
-                "floor",
-                Type::Num,
-                "0",
-                "The height of a vessel's floor, or of its contents, above the lower end: at least the wall thickness.",
-            )
+            word("caps", &["both", "bottom", "top", "none"], "Which ends are closed."),
+            num("floor", 0.0, "The height of a vessel's floor, or of its contents, above the lower end: at least the wall thickness.")
             .unit("scene units"),
         ],
         SOLID,
@@ -67,13 +48,13 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             arg("radius", Type::Num, "The radius.").unit("scene units"),
-            opt("sides", Type::Int, "32", "The number of meridians, 4 to 1024."),
+            int("sides", 32, [4, 1024], "The number of meridians."),
         ],
         SOLID,
         "A sphere centred at the origin.",
         |a| {
-            let sides = if a.given(1) { a.int_in(1, 4, 1024)? as u32 } else { 32 };
-            sphere(a.num(0)?, sides).map(|m| solid(Solid::new(Arc::new(m)))).map_err(fault)
+            let made = sphere(a.num("radius")?, a.int("sides")?);
+            made.map(|m| solid(Solid::new(Arc::new(m)))).map_err(fault)
         },
     )
     .vjp(vjps::sphere),
@@ -83,7 +64,7 @@ pub(super) const TABLE: &[Row] = &[
         &[arg("size", Type::Nums, "The three edge lengths, or one number for a cube.").unit("scene units")],
         SOLID,
         "A box centred at the origin.",
-        |a| cuboid(vector(a, 0, DVec3::ONE)?).map(|m| solid(Solid::new(Arc::new(m)))).map_err(fault),
+        |a| cuboid(vector(a, "size")?).map(|m| solid(Solid::new(Arc::new(m)))).map_err(fault),
     )
     .vjp(vjps::cuboid),
     native(
@@ -118,13 +99,13 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             arg("solid", SOLID, "A solid."),
-            opt("fit", Type::Bool, "false", "Also scales it so that the longest edge of its bounding box is 2."),
+            flag("fit", "Also scales it so that the longest edge of its bounding box is 2."),
         ],
         SOLID,
         "The solid moved so that the centre of its bounding box is at the origin.",
         |a| {
             let s = a.object::<SolidValue>(0, "a solid")?;
-            Ok(Value::object(SolidValue(s.0.centred(a.bool_or(1, false)?))))
+            Ok(Value::object(SolidValue(s.0.centred(a.bool("fit")?))))
         },
     )
     .vjp(vjps::centred),
@@ -157,15 +138,15 @@ pub(super) const TABLE: &[Row] = &[
         "affine",
         SECTION,
         &[
-            opt("translate", Type::Array, "[0, 0, 0]", "The translation.").unit("scene units"),
-            opt("rotate", Type::Array, "[0, 0, 0]", "The rotations about x, then y, then z.").unit("radians"),
-            opt("scale", Type::Nums, "1", "The scale factors along the axes, or one for all."),
+            arg("translate", Type::Array, "The translation.").or(Default::Nums(&[0.0, 0.0, 0.0])).unit("scene units"),
+            arg("rotate", Type::Array, "The rotations about x, then y, then z.").or(Default::Nums(&[0.0, 0.0, 0.0])).unit("radians"),
+            arg("scale", Type::Nums, "The scale factors along the axes, or one for all.").or(Default::Num(1.0)),
         ],
         AFFINE,
         "An affine transformation (placement) p' = T Rz Ry Rx S p; `placement * solid` applies it \
          to a solid, and placements can be multiplied.",
         |a| {
-            let placed = Affine::new(vector(a, 0, DVec3::ZERO)?, vector(a, 1, DVec3::ZERO)?, vector(a, 2, DVec3::ONE)?);
+            let placed = Affine::new(vector(a, "translate")?, vector(a, "rotate")?, vector(a, "scale")?);
             if !placed.is_finite() {
                 return Err(Fault::domain("scene.affine: its numbers must be finite"));
             }
@@ -177,4 +158,79 @@ pub(super) const TABLE: &[Row] = &[
 
 fn solid(solid: Solid) -> Value {
     Value::object(SolidValue(solid))
+}
+
+/// Reads three numbers, or one for all three.
+fn vector(a: &Args, name: &str) -> Result<DVec3, Fault> {
+    a.vec3(name).map(DVec3::from)
+}
+
+/// Reads three numbers, one for all three, or a record of x, y and z.
+pub(super) fn vector_of(v: &Value) -> Option<DVec3> {
+    match v {
+        Value::Num(x) => Some(DVec3::splat(*x)),
+        Value::Array(xs) => <[f64; 3]>::try_from(&**xs).ok().map(DVec3::from_array),
+        Value::Record(r) => {
+            let part = |name: &str| match r.get(name) {
+                Some(Value::Num(x)) => Some(*x),
+                _ => None,
+            };
+            Some(DVec3::new(part("x")?, part("y")?, part("z")?))
+        }
+        _ => None,
+    }
+}
+
+/// The number of flat sides of a round lathe's mesh, which is made for export and for
+/// pictures of several objects.
+const SIDES_OF_ROUND: u32 = 96;
+
+/// The arguments of `lathe`.
+struct LatheArgs {
+    profiles: Vec<Profile>,
+    sides: u32,
+    /// It is drawn without a mesh where it is the only object.
+    round: bool,
+    wall: Wall,
+    caps: Caps,
+}
+
+fn lathe_args(a: &Args) -> Result<LatheArgs, Fault> {
+    let profiles = profiles(a)?;
+    let round = matches!(a.get("sides"), Value::Num(0.0));
+    let sides = if round { SIDES_OF_ROUND } else { a.int_in("sides", 3, 1024)? as u32 };
+    let caps = match a.word("caps")? {
+        "bottom" => Caps::Bottom,
+        "top" => Caps::Top,
+        "none" => Caps::None,
+        _ => Caps::Both,
+    };
+    let wall = Wall { thickness: a.num("thickness")?, floor: a.num("floor")? };
+    Ok(LatheArgs { profiles, sides, round, wall, caps })
+}
+
+/// Reads one profile or an array of them.
+fn profiles(a: &Args) -> Result<Vec<Profile>, Fault> {
+    let wanted = "profiles such as { y: [0, 1], r: [0.5, 0.4] }";
+    let one = |v: &Value| {
+        let Value::Record(record) = v else { return Err(a.element_wrong(0, wanted, v)) };
+        let numbers = |name: &str| match record.get(name) {
+            Some(Value::Array(xs)) => Ok(xs.to_vec()),
+            Some(Value::Num(x)) => Ok(vec![*x]),
+            Some(v) => Err(a.element_wrong(0, wanted, v)),
+            None => Err(Fault::type_error(format!(
+                "scene.lathe: a profile needs the field `{name}`: {wanted}"
+            ))),
+        };
+        let (y, mut r) = (numbers("y")?, numbers("r")?);
+        if r.len() == 1 {
+            r.resize(y.len(), r[0]);
+        }
+        Ok(Profile { y, r })
+    };
+    match a.get(0) {
+        v @ Value::Record(_) => Ok(vec![one(v)?]),
+        Value::List(all) => all.iter().map(one).collect(),
+        _ => Err(a.wrong(0, wanted)),
+    }
 }

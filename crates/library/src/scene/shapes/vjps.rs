@@ -1,7 +1,7 @@
 //! Vector-Jacobian products of shapes and placements: from the vertices of surfaces and
 //! landmarks to sizes and profiles.
 
-use super::args::{LatheArgs, lathe_args, vector};
+use super::{LatheArgs, lathe_args, vector};
 use crate::scene::SolidValue;
 use crate::scene::adjoints::{BySolid, shaped};
 use glam::{DMat3, DVec3};
@@ -62,7 +62,7 @@ pub(super) fn sphere(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints
 /// For `scene.box`.
 pub(super) fn cuboid(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let Some((mesh, by_vertex)) = surface(made, by) else { return Some(ArgAdjoints::new()) };
-    let by_size = vjp_cuboid(vector(a, 0, DVec3::ONE).ok()?, mesh, &by_vertex);
+    let by_size = vjp_cuboid(vector(a, "size").ok()?, mesh, &by_vertex);
     Some(smallvec![shaped(a.get(0), by_size)])
 }
 
@@ -96,8 +96,7 @@ pub(super) fn group(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints>
 pub(super) fn centred(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let by = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
     let solid: &Solid = &a.object::<SolidValue>(0, "a solid").ok()?.0;
-    let (vertices, landmarks) =
-        solid.vjp_centred(a.bool_or(1, false).ok()?, &by.vertices, &by.landmarks);
+    let (vertices, landmarks) = solid.vjp_centred(a.bool("fit").ok()?, &by.vertices, &by.landmarks);
     Some(smallvec![BySolid { landmarks, vertices }.into_adjoint()])
 }
 
@@ -115,7 +114,7 @@ pub(super) fn landmarks(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoi
 
 /// For `scene.affine`, T Rz Ry Rx S.
 pub(super) fn affine(a: &Args, _: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
-    let (turn, scale) = (vector(a, 1, DVec3::ZERO).ok()?, vector(a, 2, DVec3::ONE).ok()?);
+    let (turn, scale) = (vector(a, "rotate").ok()?, vector(a, "scale").ok()?);
     let by = by.numbers(12);
     let (linear, shift) = (DMat3::from_cols_slice(&by[..9]), DVec3::from_slice(&by[9..]));
     let turns = [

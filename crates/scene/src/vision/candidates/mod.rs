@@ -35,7 +35,7 @@ use pcadlang_numerics::platform::threads::map_side_by_side;
 use picture::Picture;
 use pixels::Pixels;
 pub use rim::tilts;
-use score::{Judge, Scored, suppressed};
+use score::{Scored, Scorer, suppressed};
 
 /// Minimum and maximum size of regions, as a fraction of the picture.
 const LEAST: f64 = 0.004;
@@ -121,9 +121,10 @@ impl Candidate {
 /// Returns the best regions with their scores.
 fn found(picture: &Picture, most: usize) -> Vec<Scored> {
     let field = Field::new(picture, clusters::codebook(picture));
-    let judge = Judge::new(picture, &field.codewords);
-    let bounded = |area: Area| Scored::bounded(judge.bound(&area), area);
-    let best = |all: Vec<Scored>, most| suppressed(all, |area| judge.likeness(area), OVERLAP, most);
+    let scorer = Scorer::new(picture, &field.codewords);
+    let bounded = |area: Area| Scored::bounded(scorer.bound(&area), area);
+    let best =
+        |all: Vec<Scored>, most| suppressed(all, |area| scorer.likeness(area), OVERLAP, most);
     let regions = best(regions(picture).into_iter().map(bounded).collect(), SEEDS.max(most));
     let cuts = map_side_by_side(&regions[..SEEDS.min(regions.len())], |seed| field.cut(&seed.area));
     let cuts = cuts.into_iter().flatten().map(bounded);

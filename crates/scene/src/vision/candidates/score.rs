@@ -11,15 +11,15 @@ use std::collections::BinaryHeap;
 const SYMMETRIC: f64 = 0.5;
 
 /// Data for scoring regions of a picture.
-pub struct Judge<'a> {
+pub struct Scorer<'a> {
     codewords: &'a [u8],
     /// The edge strength at a pixel or beside it, 0 to 1.
     edges: Vec<f32>,
 }
 
-impl Judge<'_> {
+impl Scorer<'_> {
     /// Prepares a picture with its letters.
-    pub fn new<'a>(picture: &Picture, codewords: &'a [u8]) -> Judge<'a> {
+    pub fn new<'a>(picture: &Picture, codewords: &'a [u8]) -> Scorer<'a> {
         let (w, h) = (picture.width, picture.height);
         let most = |p: usize| {
             let (i, j) = (p % w, p / w);
@@ -28,7 +28,7 @@ impl Judge<'_> {
                 rows.flat_map(|j| (i.saturating_sub(1)..(i + 2).min(w)).map(move |i| j * w + i));
             near.map(|q| picture.gradient.magnitude[q]).fold(0.0, f32::max)
         };
-        Judge {
+        Scorer {
             codewords,
             edges: (0..w * h).map(|p| (most(p) / picture.strong).min(1.0)).collect(),
         }

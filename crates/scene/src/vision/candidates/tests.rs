@@ -253,8 +253,8 @@ fn a_cut_moves_to_the_object() {
     let cut = field.cut(&seed).unwrap();
     let (before, after) = (seed.iou(&truth), cut.iou(&truth));
     assert!(after > 0.94 && before < 0.88, "{after} from {before}");
-    let judge = Judge::new(&picture, &field.codewords);
-    let score = |area: &Area| judge.bound(area) * judge.likeness(area);
+    let scorer = Scorer::new(&picture, &field.codewords);
+    let score = |area: &Area| scorer.bound(area) * scorer.likeness(area);
     assert!(score(&truth) > score(&seed));
     let best = |all: &[(f64, &Area)], overlap| {
         let all = all.iter().map(|(score, area)| Scored::bounded(*score, (*area).clone()));

@@ -3,7 +3,7 @@
 //! they are one-sided.
 
 use super::super::elements::Element;
-use super::super::field::{PER_RADIAN, channel};
+use super::super::elements::{PER_RADIAN, channel};
 use super::reverse::Piece;
 use super::{Chamfer, Mode, NOTHING, Scratch};
 use crate::contours::ContourSlice;

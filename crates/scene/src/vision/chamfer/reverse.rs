@@ -3,7 +3,7 @@
 //! points; it does not render. Invariant: the result does not depend on the order of the
 //! elements, and every candidate that could be the nearest is examined.
 
-use super::super::field::{Edge, Edges, channel, turn_between};
+use super::super::elements::{Edge, Edges, channel, turn_between};
 use crate::contours::ContourSlice;
 
 /// Number of buckets along the longer side.

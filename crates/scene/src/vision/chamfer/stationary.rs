@@ -6,7 +6,7 @@
 //! distances does not depend on the order in which they are compared, and nothing that
 //! could be nearer is left out.
 
-use super::super::field::Edge;
+use super::super::elements::Edge;
 use super::reverse::{Piece, Reverse, pieces_of};
 use crate::contours::ContourSlice;
 

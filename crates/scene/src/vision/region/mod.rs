@@ -42,16 +42,21 @@ pub struct RegionOptions {
     pub shading: f64,
 }
 
+impl RegionOptions {
+    /// The defaults.
+    pub const USUAL: RegionOptions = RegionOptions {
+        power: 0.05,
+        tiles: 8,
+        tile_power: 0.1,
+        colours: 32,
+        prior: 0.5,
+        shading: 0.0,
+    };
+}
+
 impl Default for RegionOptions {
     fn default() -> Self {
-        RegionOptions {
-            power: 0.05,
-            tiles: 8,
-            tile_power: 0.1,
-            colours: 32,
-            prior: 0.5,
-            shading: 0.0,
-        }
+        RegionOptions::USUAL
     }
 }
 

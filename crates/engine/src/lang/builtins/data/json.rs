@@ -12,22 +12,25 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Value, String> {
     if bytes.len() > MOST_BYTES {
         return Err(format!("{} bytes of JSON; at most {MOST_BYTES}", bytes.len()));
     }
-    let value = serde_json::from_slice(bytes).map(convert).map_err(|e| e.to_string())?;
+    let value = serde_json::from_slice(bytes).map(from_json).map_err(|e| e.to_string())?;
     match value.extent() {
         Extent::TooLarge => Err(format!("more than {MOST_ELEMENTS} elements")),
         Extent::Fits | Extent::TooDeep => Ok(value),
     }
 }
 
-fn convert(json: serde_json::Value) -> Value {
+/// Returns the value that JSON stands for.
+pub fn from_json(json: serde_json::Value) -> Value {
     match json {
         serde_json::Value::Null => Value::Unit,
         serde_json::Value::Bool(b) => Value::Bool(b),
         serde_json::Value::Number(n) => Value::Num(n.as_f64().unwrap_or(f64::NAN)),
         serde_json::Value::String(s) => Value::Str(s.into()),
-        serde_json::Value::Array(xs) => Value::from_elements(xs.into_iter().map(convert).collect()),
+        serde_json::Value::Array(xs) => {
+            Value::from_elements(xs.into_iter().map(from_json).collect())
+        }
         serde_json::Value::Object(fields) => Value::Record(Arc::new(
-            fields.into_iter().map(|(k, v)| (Arc::from(k), convert(v))).collect(),
+            fields.into_iter().map(|(k, v)| (Arc::from(k), from_json(v))).collect(),
         )),
     }
 }

@@ -10,7 +10,8 @@ mod format;
 mod json;
 mod kinds;
 
-pub use format::{Beside, DataFormat, Literal, Options};
+pub use format::{DataFormat, Literal, Options, ReadRelative};
+pub use json::from_json;
 
 use super::{Arg, Args, Row, Type, arg, function};
 use crate::lang::error::{Fault, FaultKind};
@@ -52,7 +53,13 @@ pub(super) const TABLE: &[Row] = &[
 struct Text(fn(&[u8], &str) -> Result<Value, String>);
 
 impl DataFormat for Text {
-    fn load(&self, file: &str, bytes: &[u8], _: &Options, _: &Beside) -> Result<Value, Fault> {
+    fn load(
+        &self,
+        file: &str,
+        bytes: &[u8],
+        _: &Options,
+        _: &ReadRelative,
+    ) -> Result<Value, Fault> {
         (self.0)(bytes, file).map_err(|why| unreadable(file, &why))
     }
 }

@@ -2,7 +2,7 @@
 //! `pcadlang doc`, and all of it as Markdown.
 
 use crate::lang::builtins::examples::INCLUDE;
-use crate::lang::builtins::{Argument, Builtin, Kind, Table, Type};
+use crate::lang::builtins::{Argument, Builtin, Domain, Kind, Table, Type};
 use pcadlang_syntax::{Place, STATEMENTS, Statement};
 use std::fmt::Write;
 
@@ -139,9 +139,14 @@ fn result_type(b: &Builtin) -> Option<String> {
     }
 }
 
-/// The type, unit and default of an argument, such as "number, radians, default 0."
+/// The type, domain, unit and default of an argument, such as "number, radians, default 0."
 fn traits(a: &Argument) -> String {
     let mut s = a.ty.to_string();
+    match a.domain {
+        Domain::Any => {}
+        Domain::Whole([low, high]) => drop(write!(s, " from {low} to {high}")),
+        domain => drop(write!(s, ", {domain}")),
+    }
     if !a.unit.is_empty() {
         let _ = write!(s, ", {}", a.unit);
     }

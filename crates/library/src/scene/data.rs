@@ -1,63 +1,48 @@
 //! The kinds of data that the scene brings: photographs, maps, bodies, meshes, keypoints,
 //! detectors.
 
-mod armature;
-mod options;
-
-use super::left_out;
-use super::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue, SolidValue};
-use pcadlang_engine::lang::builtins::data::{
-    Beside, DataFormat, FILE, Literal, Options, kind, unreadable,
+use super::{
+    ArmatureValue, DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue, SolidValue,
+    left_out,
 };
-use pcadlang_engine::lang::builtins::{Arg, Row, Type, arg, opt};
+use pcadlang_engine::lang::builtins::data::{
+    DataFormat, FILE, Literal, Options, ReadRelative, kind, unreadable,
+};
+use pcadlang_engine::lang::builtins::{Arg, Default, Row, Type, arg, flag, num, opt, word};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
-use pcadlang_scene::geom::{FileFrame, GeomError, Solid, gltf, obj};
+use pcadlang_scene::geom::armature::{Armature, morphs_from_json, rig_from_json};
+use pcadlang_scene::geom::{FileFrame, GeomError, Solid, UpAxis, gltf, obj};
 use pcadlang_scene::vision::keypoints::{self, Keypoints, People};
 use pcadlang_scene::vision::{ContourMap, Limits, VisionError, depth, mask, npy, photo};
 use std::sync::Arc;
 
 const SHAPE: &[Arg] = &[
     arg("file", Type::Str, "The path, relative to the program's folder."),
-    opt(
-        "up",
-        Type::Str,
-        "\"y\"",
-        "The file's up axis: \"x\", \"y\" or \"z\"; it is rotated to +y.",
-    ),
-    opt(
-        "unit",
-        Type::Num,
-        "1",
-        "The length of the file's unit in scene units: 0.01 for centimetres.",
-    )
-    .unit("m"),
+    word("up", &["y", "x", "z"], "The file's up axis; it is rotated to +y."),
+    num("unit", 1.0, "The length of the file's unit in scene units: 0.01 for centimetres.")
+        .unit("m"),
 ];
 
 const NETWORK: &[Arg] = &[
     opt("file", Type::Str, "none", "The path, relative to the program's folder."),
-    opt(
-        "colours",
-        Type::Str,
-        "\"rgb\"",
-        "The order of the network's input channels, \"rgb\" or \"bgr\".",
-    ),
-    opt(
+    word("colours", &["rgb", "bgr"], "The order of the network's input channels."),
+    num(
         "white",
-        Type::Num,
-        "1",
+        1.0,
         "The value of white, above 0; the network's input is (value - mean) / spread.",
     ),
-    opt("mean", Type::Any, "0", "The mean to subtract: a number, or one per channel."),
-    opt("spread", Type::Any, "1", "The divisor: a number, or one per channel."),
+    arg("mean", Type::Any, "The mean to subtract: a number, or one per channel.")
+        .or(Default::Num(0.0)),
+    arg("spread", Type::Any, "The divisor: a number, or one per channel.").or(Default::Num(1.0)),
     opt(
         "output",
         Type::Any,
         "the last",
         "The output to use as the map: its name, or its number from 1.",
     ),
-    opt("logits", Type::Bool, "false", "Whether the map holds log odds instead of probabilities."),
-    opt("shows", Type::Str, "\"contours\"", "What the map shows, \"contours\" or \"objects\"."),
+    flag("logits", "Whether the map holds log odds instead of probabilities."),
+    word("shows", &["contours", "objects"], "What the map shows."),
 ];
 
 /// Contour detectors from files, which the crate `contour_detectors` reads.
@@ -106,7 +91,7 @@ pub(super) const TABLE: &[Row] = &[
          morphs in the same folder: see `docs/howto/bodies.md`. `up` and `unit` apply to glTF.",
         || {
             Arc::new(Shape {
-                load: armature::load,
+                load: armature,
                 example: "armature(\"file.glb\", up = \"z\", unit = 0.01)",
             })
         },
@@ -139,7 +124,13 @@ pub(super) const TABLE: &[Row] = &[
 struct Plain(fn(&[u8], &Limits) -> Result<Value, VisionError>);
 
 impl DataFormat for Plain {
-    fn load(&self, file: &str, bytes: &[u8], _: &Options, _: &Beside) -> Result<Value, Fault> {
+    fn load(
+        &self,
+        file: &str,
+        bytes: &[u8],
+        _: &Options,
+        _: &ReadRelative,
+    ) -> Result<Value, Fault> {
         (self.0)(bytes, &Limits::default()).map_err(|e| unreadable(file, &e.to_string()))
     }
 }
@@ -168,7 +159,7 @@ fn depth(bytes: &[u8], limits: &Limits) -> Result<Value, VisionError> {
 struct NoFiles;
 
 impl DataFormat for NoFiles {
-    fn load(&self, file: &str, _: &[u8], _: &Options, _: &Beside) -> Result<Value, Fault> {
+    fn load(&self, file: &str, _: &[u8], _: &Options, _: &ReadRelative) -> Result<Value, Fault> {
         Err(left_out(&format!("{file}: contour detectors from files"), "contour_detectors"))
     }
 
@@ -180,7 +171,7 @@ impl DataFormat for NoFiles {
 /// A mesh or an armature, in a frame of its own.
 #[derive(Debug)]
 struct Shape {
-    load: fn(&str, &[u8], &FileFrame, &Beside) -> Result<Value, String>,
+    load: fn(&str, &[u8], &FileFrame, &ReadRelative) -> Result<Value, GeomError>,
     example: &'static str,
 }
 
@@ -190,15 +181,14 @@ impl DataFormat for Shape {
         file: &str,
         bytes: &[u8],
         options: &Options,
-        beside: &Beside,
+        beside: &ReadRelative,
     ) -> Result<Value, Fault> {
-        options::frame(options)
-            .and_then(|frame| (self.load)(file, bytes, &frame, beside))
-            .map_err(|why| unreadable(file, &why))
+        let frame = frame(options).map_err(|why| unreadable(file, &why))?;
+        (self.load)(file, bytes, &frame, beside).map_err(|e| unreadable(file, &e.to_string()))
     }
 
     fn check_option(&self, name: &str, value: &Literal) -> Result<(), String> {
-        options::frame(&Options::single(name, value.clone())).map(|_| ())
+        frame(&Options::single(name, value.clone())).map(|_| ())
     }
 
     fn example(&self) -> Option<&'static str> {
@@ -206,13 +196,54 @@ impl DataFormat for Shape {
     }
 }
 
-fn mesh(file: &str, bytes: &[u8], frame: &FileFrame, beside: &Beside) -> Result<Value, String> {
+fn mesh(
+    file: &str,
+    bytes: &[u8],
+    frame: &FileFrame,
+    beside: &ReadRelative,
+) -> Result<Value, GeomError> {
     let mesh = match gltf::is_gltf(file, bytes) {
-        true => gltf::load(bytes, frame, beside).and_then(gltf::Loaded::mesh),
-        false => obj::load_in(bytes, frame),
+        true => gltf::load(bytes, frame, beside)?.mesh()?,
+        false => obj::load_in(bytes, frame)?,
     };
-    mesh.map(|m| Value::object(SolidValue(Solid::new(Arc::new(m)))))
-        .map_err(|e: GeomError| e.to_string())
+    Ok(Value::object(SolidValue(Solid::new(Arc::new(mesh)))))
+}
+
+/// Reads a glTF file, or a rig, its mesh, and its morphs if it names some.
+fn armature(
+    file: &str,
+    bytes: &[u8],
+    frame: &FileFrame,
+    beside: &ReadRelative,
+) -> Result<Value, GeomError> {
+    let invalid = |why: &str| GeomError::Invalid(why.to_owned());
+    let value = |body: Armature| Value::object(ArmatureValue(Arc::new(body)));
+    if gltf::is_gltf(file, bytes) {
+        let loaded = gltf::load(bytes, frame, beside)?;
+        if loaded.rig.is_none() {
+            return Err(invalid(
+                "the glTF file has no skin, so it does not define which joint moves which \
+                 vertices; read it with mesh(…) and rig it with scene.autorig",
+            ));
+        }
+        return loaded.armature().map(value);
+    }
+    if *frame != FileFrame::default() {
+        return Err(invalid(
+            "`up` and `unit` are for glTF files; a rig file is in the scene's axes and units",
+        ));
+    }
+    let file = rig_from_json(bytes)?;
+    let within = |path: &str, e: GeomError| GeomError::Invalid(format!("{path}: {e}"));
+    let read = |path: &str| beside(path).map_err(GeomError::Invalid);
+    let mesh = obj::indexed(&read(&file.mesh)?).map_err(|e| within(&file.mesh, e))?;
+    let rig = file.rig.clone();
+    let mut body = Armature::new(file.rig, mesh.positions, mesh.triangles, file.influences)?;
+    if let Some(path) = &file.morphs {
+        let morphs = morphs_from_json(&read(path)?, &rig).map_err(|e| within(path, e))?;
+        body = body.with_morphs(morphs).map_err(|e| within(path, e))?;
+    }
+    Ok(value(body))
 }
 
 /// A person's joints; `#ID` after the path selects the person.
@@ -220,7 +251,13 @@ fn mesh(file: &str, bytes: &[u8], frame: &FileFrame, beside: &Beside) -> Result<
 struct KeypointsFile;
 
 impl DataFormat for KeypointsFile {
-    fn load(&self, file: &str, bytes: &[u8], _: &Options, _: &Beside) -> Result<Value, Fault> {
+    fn load(
+        &self,
+        file: &str,
+        bytes: &[u8],
+        _: &Options,
+        _: &ReadRelative,
+    ) -> Result<Value, Fault> {
         load_keypoints(file, bytes, None)
     }
 
@@ -246,4 +283,31 @@ pub fn load_keypoints(file: &str, bytes: &[u8], picture: Option<&str>) -> Result
         let fault = Fault::new(FaultKind::Other, format!("{path}: {}", e.message));
         e.hint.into_iter().fold(fault, Fault::with_hint)
     })
+}
+
+/// The axes and the unit of a mesh file.
+///
+/// # Errors
+/// A value that does not fit: a message for the user.
+fn frame(options: &Options) -> Result<FileFrame, String> {
+    let (mut up, mut unit) = (UpAxis::default(), 1.0);
+    for (name, value) in options.iter() {
+        match (name, value) {
+            ("up", Literal::Str(axis)) => {
+                up = match &**axis {
+                    "x" => UpAxis::X,
+                    "y" => UpAxis::Y,
+                    "z" => UpAxis::Z,
+                    other => {
+                        return Err(format!("`up` must be \"x\", \"y\" or \"z\", not \"{other}\""));
+                    }
+                };
+            }
+            ("up", _) => return Err("`up` must be an axis in quotes".into()),
+            ("unit", Literal::Num(x)) => unit = *x,
+            ("unit", _) => return Err("`unit` must be a literal number".into()),
+            _ => {}
+        }
+    }
+    FileFrame::new(up, unit).map_err(|e| e.to_string())
 }
