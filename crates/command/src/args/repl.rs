@@ -53,11 +53,10 @@ another running command, which then changes nothing; Ctrl-D quits.";
 pub enum Graphics {
     /// The graphics protocol of kitty and ghostty
     Kitty,
-    /// The graphics protocol of iTerm2 and WezTerm
+    /// The graphics protocol of iTerm2, WezTerm and mintty
     Iterm,
-    /// Sixels: xterm, foot, mlterm, mintty
-    Sixel,
     /// Half blocks in 24-bit colours
+    #[value(alias = "sixel")]
     Blocks,
     /// Half blocks in 256 colours
     Blocks256,

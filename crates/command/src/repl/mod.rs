@@ -6,7 +6,6 @@ mod editor;
 mod iterm;
 mod kitty;
 mod pictures;
-mod sixel;
 #[cfg(test)]
 mod testing;
 

@@ -1,7 +1,7 @@
 //! Shows pictures in the terminal, or writes them to files.
 
 use super::super::args::Graphics;
-use super::{blocks, iterm, kitty, sixel};
+use super::{blocks, iterm, kitty};
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use pcadlang_report::pictures::png;
@@ -32,10 +32,8 @@ pub fn graphics_from_env(variable: impl Fn(&str) -> Option<String>, is_terminal:
         blocks
     } else if variable("KITTY_WINDOW_ID").is_some() || is(&["kitty", "ghostty"]) {
         Graphics::Kitty
-    } else if is(&["iTerm.app", "WezTerm"]) {
+    } else if is(&["iTerm.app", "WezTerm", "mintty"]) {
         Graphics::Iterm
-    } else if is(&["sixel", "mlterm", "foot", "contour", "mintty"]) {
-        Graphics::Sixel
     } else {
         blocks
     }
@@ -63,7 +61,6 @@ pub fn shown(picture: &Picture, graphics: Graphics) -> Result<String, Failure> {
     Ok(match graphics {
         Graphics::Kitty => kitty::encode(&encoded(&fitting())?),
         Graphics::Iterm => iterm::encode(&encoded(&fitting())?),
-        Graphics::Sixel => sixel::encode(&fitting()),
         _ => blocks::encode(&pixels, columns(), graphics == Graphics::Blocks),
     })
 }
@@ -99,7 +96,6 @@ mod tests {
             told(&[("TERM", "xterm-256color"), ("TERM_PROGRAM", "iTerm.app")]),
             Graphics::Iterm
         );
-        assert_eq!(told(&[("TERM", "foot")]), Graphics::Sixel);
         assert_eq!(
             told(&[("TERM", "xterm-256color"), ("COLORTERM", "truecolor")]),
             Graphics::Blocks

@@ -6,7 +6,6 @@
 //! buffers count as background, so no input panics.
 
 mod dots;
-mod font;
 mod layers;
 mod limbs;
 mod sheet;
@@ -16,7 +15,7 @@ mod surface;
 pub use dots::{DETECTED, OF_SCENE, dots};
 pub use layers::{depth, normals, parts, residuals};
 pub use limbs::limbs;
-pub use sheet::{captioned_sheet, contact_sheet};
+pub use sheet::contact_sheet;
 pub use strokes::{contour_map, contours};
 pub use surface::{frequency, mask, overlaid, overlay, shaded};
 

@@ -6,7 +6,7 @@ use crate::failure::{Failure, plain};
 use crate::places::sized;
 use crate::reopening::reopened::quoted;
 use crate::{files, resume};
-use pcadlang_report::pictures::{captioned_sheet, png};
+use pcadlang_report::pictures::{contact_sheet, png};
 use pcadlang_report::{number, table};
 use serde_json::Value;
 use std::path::Path;
@@ -161,7 +161,7 @@ fn quantities(compared: &Comparison) -> String {
     text
 }
 
-/// Writes the overlays side by side.
+/// Writes the overlays side by side, A on the left.
 fn pictures(a: &Compare, out: &Path) -> Result<(), Failure> {
     let overlay = |folder: &Path| {
         let path = folder.join("overlay.png");
@@ -170,7 +170,5 @@ fn pictures(a: &Compare, out: &Path) -> Result<(), Failure> {
         Ok::<_, Failure>(sized(&picture, SIDE))
     };
     let both = [overlay(&a.a)?, overlay(&a.b)?];
-    let captions = [&a.a, &a.b].map(|path| path.display().to_string());
-    let sheet = captioned_sheet(&both, 2, &captions);
-    files::write(out, &png(&sheet).map_err(|e| plain(e.to_string()))?)
+    files::write(out, &png(&contact_sheet(&both, 2)).map_err(|e| plain(e.to_string()))?)
 }
