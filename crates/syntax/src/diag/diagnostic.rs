@@ -81,6 +81,16 @@ impl Diagnostic {
         self
     }
 
+    /// Adds a hint in place.
+    pub fn hint_also(&mut self, hint: impl Into<String>) {
+        self.hints.push(hint.into());
+    }
+
+    /// Adds a label that helps to explain the error, in place.
+    pub fn point_at(&mut self, span: Span, text: &str) {
+        self.labels.push(Label { span, text: text.into(), primary: false });
+    }
+
     /// Adds a note.
     #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {

@@ -191,17 +191,6 @@ impl<'a> Args<'a> {
             .with_hint(format!("at most {MOST_ELEMENTS} can be made in one call"))
     }
 
-    /// Reads a vector of three numbers, or one number for all three, or returns a
-    /// default.
-    pub fn vec3_or(&self, i: usize, default: [f64; 3]) -> Result<[f64; 3], Fault> {
-        match self.get(i) {
-            Value::Unit => Ok(default),
-            Value::Num(x) => Ok([*x; 3]),
-            Value::Array(xs) if xs.len() == 3 => Ok([xs[0], xs[1], xs[2]]),
-            _ => Err(self.wrong(i, "three numbers [x, y, z], or one for all of them")),
-        }
-    }
-
     /// Reads the elements of an array of any type.
     pub fn elements(&self, i: usize) -> Result<Cow<'a, [Value]>, Fault> {
         match self.get(i) {

@@ -4,7 +4,7 @@
 //! Only messages are produced here; nothing in this file decides whether a program is
 //! correct.
 
-use super::lowerer::{AddHint, Lowerer};
+use super::lowerer::Lowerer;
 use crate::lang::builtins::{Builtin, Kind};
 use pcadlang_syntax::ast::{Arg, ItemKind, Name, Stmt, StmtKind};
 use pcadlang_syntax::diag::{Diagnostic, nearest};
