@@ -28,7 +28,7 @@ Exit codes: 0 success, 1 an error in the program, its data or a file, 2 an error
 #[derive(Debug, Parser)]
 #[command(name = "pcadlang", version, max_term_width = 100, after_help = EXIT_CODES)]
 pub struct Cli {
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -289,7 +289,7 @@ pub struct Check {
     /// A file for a `data` item; simulated data have the same shape
     #[arg(long, value_name = "[NAME=]FILE")]
     pub observe: Vec<String>,
-    /// What the programs may read and build
+    /// The files that the programs may read, and their limits
     #[command(flatten)]
     pub allowed: Allowed,
 }
@@ -303,7 +303,7 @@ code 1 if a quantity fails or the program cannot be simulated. A correct plan fa
 /// `predict`.
 #[derive(Args, Debug)]
 pub struct Predict {
-    /// What is run
+    /// The run
     #[command(flatten)]
     pub job: Job,
     /// Draw from the prior instead of the posterior

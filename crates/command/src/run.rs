@@ -36,7 +36,7 @@ pub fn run(a: &Run) -> Result<(), Failure> {
         Some(path) => RunDir::create(path).map_err(|e| plain(e.to_string()))?,
         None => RunDir::fresh(runs, name).map_err(|e| plain(e.to_string()))?,
     };
-    let manner = RunMode {
+    let mode = RunMode {
         live: !(a.quiet || a.json || a.stream),
         checkpoint: a.checkpoint,
         resume: a.resume,
@@ -44,7 +44,7 @@ pub fn run(a: &Run) -> Result<(), Failure> {
         follow: a.live.clone(),
         stream: a.stream,
     };
-    let outcome = job::perform(job, &ready, &dir, &record, &interrupt, manner)?;
+    let outcome = job::perform(job, &ready, &dir, &record, &interrupt, mode)?;
     let explained = a.explain.then(|| explain(&ready.model, &outcome, job.sampling.seed));
     if let Some(explained) = &explained {
         let text = serde_json::to_vec_pretty(&explained.json()).unwrap_or_default();

@@ -19,7 +19,7 @@ use pcadlang_workbench::tradeoff::Quality;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// What a program is given.
+/// The inputs of a program.
 #[derive(Args, Clone, Debug)]
 pub struct Inputs {
     /// The program: a file, the name of a shipped one such as lathe.pcad, or - for the
@@ -40,12 +40,12 @@ pub struct Inputs {
     /// Whom it is about
     #[command(flatten)]
     pub who: PersonArgs,
-    /// What it may read and build
+    /// The files it may read, and its limits
     #[command(flatten)]
     pub allowed: Allowed,
 }
 
-/// What a program may read and build.
+/// The files that a program may read, and its limits.
 #[derive(Args, Clone, Debug, Default)]
 pub struct Allowed {
     /// A folder the program may read files from, besides its own; may be repeated
@@ -162,7 +162,7 @@ impl Job {
 /// `run`.
 #[derive(Args, Debug)]
 pub struct Run {
-    /// What is run
+    /// The run
     #[command(flatten)]
     pub job: Job,
     /// The folder for results [default: runs/PROG]

@@ -26,7 +26,7 @@ use std::time::{Duration, Instant};
 /// The time until the best state is written first.
 const FIRST: Duration = Duration::from_millis(200);
 
-/// What is known of the best state once it has been rendered.
+/// The facts about the best state that its rendering gives.
 #[derive(Default)]
 pub struct Shown {
     /// Its view.

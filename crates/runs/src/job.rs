@@ -60,7 +60,7 @@ pub struct Outcome {
     pub every: u64,
     /// Wall time until everything except the page was written.
     pub seconds: f64,
-    /// Whether the user interrupted the run.
+    /// True if the user interrupted the run.
     pub interrupted: bool,
 }
 
@@ -251,17 +251,17 @@ pub const CHECKPOINT: Duration = Duration::from_secs(10);
 /// How a run is carried out; its draws do not depend on this.
 #[derive(Clone, Debug)]
 pub struct RunMode {
-    /// Whether progress is shown.
+    /// True if progress is shown.
     pub live: bool,
     /// The time between checkpoints.
     pub checkpoint: Duration,
-    /// Whether to resume the run in the folder.
+    /// True to resume the run in the folder.
     pub resume: bool,
     /// How many complete states are kept.
     pub keep: u32,
     /// Where the best state is sent as it improves.
     pub follow: Option<Live>,
-    /// Whether draws are printed as they are made.
+    /// True if draws are printed as they are made.
     pub stream: bool,
 }
 

@@ -8,9 +8,9 @@ pub mod print;
 
 pub mod args;
 pub mod best;
+pub mod drawing_budget;
 pub mod edges;
 pub mod embedded;
-pub mod failure;
 pub mod files;
 pub mod inputs;
 pub mod job;
@@ -21,7 +21,6 @@ pub mod people;
 pub mod places;
 pub mod progress;
 pub mod quality;
-pub mod ration;
 pub mod ready;
 pub mod reopening;
 pub mod resume;
@@ -29,3 +28,5 @@ pub mod scene;
 pub mod stream;
 pub mod term;
 pub mod watched;
+
+pub use pcadlang_workbench::failure;

@@ -15,7 +15,7 @@ pub struct Ready {
     pub model: Model,
     /// The name and value of the photograph.
     pub named_image: Option<(String, Value)>,
-    /// Whether the program has a param `person`, which selects a person in the
+    /// True if the program has a param `person`, which selects a person in the
     /// photograph.
     pub chooses: bool,
     /// When the run's time began.

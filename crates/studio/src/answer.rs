@@ -1,11 +1,10 @@
-//! What the studio answers: JSON, bytes, or why not.
+//! Answers of the studio: JSON, bytes, or an error.
 
 use super::protocol;
 use axum::body::Bytes;
-use pcadlang_runs::failure::Failure;
+use pcadlang_runs::failure::{Failure, STOPPED};
 use pcadlang_syntax::diag::{Diagnostic, Severity, SourceMap};
 use pcadlang_workbench::lsp::positions::Encoding;
-use pcadlang_workbench::session::Trouble;
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 
@@ -43,7 +42,7 @@ fn refusal(id: u64, failure: &Failure) -> String {
     };
     match failure {
         Failure::Plain(message, hint) => error(message, hint.as_deref(), json!([])),
-        Failure::Interrupted => error(&Trouble::Stopped.to_string(), None, json!([])),
+        Failure::Interrupted => error(STOPPED, None, json!([])),
         Failure::Program(e) => {
             let first = e.diagnostics.first();
             let message = first.map_or("", |d| &d.message);

@@ -1,20 +1,20 @@
 //! The socket of the page's editor: messages of the Language Server Protocol.
 
-use super::desk::Desk;
+use super::app::App;
 use super::language::Language;
 use axum::extract::ws::{Message, WebSocket};
 use futures_util::{SinkExt, StreamExt};
 use std::sync::Arc;
 use tokio::sync::mpsc;
 
-/// The most messages that wait to be sent to a slow page.
+/// Maximum messages queued for a slow page.
 const WAITING: usize = 256;
 
 /// Serves an editor until it leaves.
-pub async fn serve(socket: WebSocket, desk: Arc<Desk>) {
+pub async fn serve(socket: WebSocket, app: Arc<App>) {
     let (mut out, mut from) = socket.split();
     let (send, mut answers) = mpsc::channel::<String>(WAITING);
-    let started = Language::start(desk.folder.path(), move |text| {
+    let started = Language::start(app.folder.path(), move |text| {
         let _ = send.blocking_send(text);
     });
     let Ok(server) = started else { return };

@@ -1,13 +1,13 @@
 //! Pictures of one run: kept, so that none is drawn twice, and drawn so rarely that the
 //! chains do not slow down.
 
-use pcadlang_runs::ration::Ration;
+use pcadlang_runs::drawing_budget::DrawingBudget;
 use serde_json::{Map, Value};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// The most pictures of a run that are kept.
+/// Maximum cached pictures per run.
 const KEPT: usize = 24;
 
 /// A picture file with its header.
@@ -17,7 +17,7 @@ pub type Encoded = (Map<String, Value>, Arc<Vec<u8>>);
 #[derive(Default)]
 pub struct Pictures {
     kept: Mutex<VecDeque<(String, Encoded)>>,
-    turn: Mutex<Ration>,
+    turn: Mutex<DrawingBudget>,
     /// Held while one is drawn, so that many tabs do not draw the same one.
     drawing: Mutex<()>,
 }

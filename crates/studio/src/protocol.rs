@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 pub struct Request {
     /// The number that its answer repeats.
     pub id: u64,
-    /// What is asked for.
+    /// The method and its parameters.
     pub call: Call,
 }
 
@@ -21,9 +21,9 @@ pub struct Request {
 pub struct Misunderstood {
     /// Its number, if that much could be read.
     pub id: Option<u64>,
-    /// What is wrong.
+    /// The error.
     pub message: String,
-    /// What may be meant.
+    /// A suggestion.
     pub hint: Option<String>,
 }
 
@@ -69,9 +69,9 @@ pub struct Settings {
 pub struct Viewpoint {
     /// Where the camera is.
     pub eye: [f64; 3],
-    /// What it looks at.
+    /// The point it looks at.
     pub target: [f64; 3],
-    /// What is up.
+    /// The upward direction.
     pub up: [f64; 3],
     /// The angle that the picture's height covers, in degrees.
     pub fov_y: f64,
@@ -85,7 +85,7 @@ macro_rules! methods {
         #[serde(deny_unknown_fields)]
         pub struct $variant { $($(#[$of])* pub $field: $ty),* })*
 
-        /// What is asked for.
+        /// The method and its parameters.
         #[derive(Debug, PartialEq)]
         #[allow(missing_docs)]
         pub enum Call { $($variant($variant)),* }
@@ -106,7 +106,7 @@ macro_rules! methods {
 }
 
 methods! {
-    /// What the opened folder holds.
+    /// The contents of the opened folder.
     Folder = "folder" {}
     /// The text of a program.
     Read = "read" { file: String }
@@ -148,7 +148,7 @@ methods! {
         value: Value,
         #[serde(default)] drag: bool,
     }
-    /// What a choice depends on, and what depends on it.
+    /// The dependencies of a choice, in both directions.
     Why = "why" { session: u64, address: String }
     /// Completes a word at the prompt.
     Complete = "complete" { session: u64, text: String, at: usize }
@@ -167,7 +167,7 @@ methods! {
     Remove = "remove" { run: String }
     /// The kept states of a run.
     Kept = "draws" { run: String }
-    /// What a run has found.
+    /// The summary of a run.
     Summary = "summary" { run: String }
     /// Draws of quantities.
     Quantity = "quantity" { run: String, names: Vec<String> }

@@ -1,4 +1,4 @@
-//! What a run has found: its draws, its summary, their comparison with another run's, and
+//! Results of a run: its draws, its summary, their comparison with another run's, and
 //! files that show it.
 
 use super::layout::finite;
@@ -13,9 +13,9 @@ use pcadlang_runs::watched::ROOM;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// The most numbers of a chain that are sent for one quantity.
+/// Maximum numbers sent per chain and quantity.
 const NUMBERS: usize = 2000;
-/// The most draws of all chains that a summary of a run under way is made from.
+/// Maximum draws, over all chains, in the summary of a run under way.
 const LIVE: usize = 4000;
 
 /// Returns the draws of a run, from memory or from its folder.
@@ -120,7 +120,7 @@ pub fn quantity(run: &Run, names: &[String]) -> Result<Value, Failure> {
 pub fn compared(a: &Run, b: &Run) -> Result<Value, Failure> {
     let of = |r: &Run| Ok::<_, Failure>((r.record(), summary(r)?));
     let both = Comparison::between([of(a)?, of(b)?]);
-    let of = |q: &pcadlang_runs::reopening::compare::Apart| json!({ "name": q.name, "a": q.a, "b": q.b, "apart": finite(q.apart) });
+    let of = |q: &pcadlang_runs::reopening::compare::QuantityDifference| json!({ "name": q.name, "a": q.a, "b": q.b, "apart": finite(q.difference) });
     let [only_a, only_b] = both.settings();
     Ok(json!({
         "settings": { "a": only_a, "b": only_b },

@@ -1,7 +1,7 @@
 //! The runs of the opened folder: those under way, and those that earlier commands left.
 
 use super::protocol::Settings;
-use super::run::{Begun, Run};
+use super::run::Run;
 use super::slots::Slots;
 use pcadlang_engine::lang::reach::path_within;
 use pcadlang_report::RunDir;
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// The most runs that have begun and not ended.
+/// Maximum unfinished runs.
 const MOST: usize = 64;
 /// The folder of new runs.
 const RUNS: &str = "runs";
@@ -105,7 +105,7 @@ impl Runs {
     /// Goes on with a paused run, or with one that was stopped or interrupted.
     pub fn go_on(&self, name: &str) -> Result<Arc<Run>, Failure> {
         let run = self.get(name)?;
-        if run.unpause()? == Begun::Already {
+        if !run.unpause()? {
             return Ok(run);
         }
         self.start(&run, true)?;

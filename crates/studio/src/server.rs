@@ -1,8 +1,8 @@
 //! The web server: the page, the two sockets, photographs that are sent, files of the
 //! opened folder.
 
+use super::app::App;
 use super::assets;
-use super::desk::Desk;
 use super::guard::{Guard, Refusal};
 use super::{language_socket, socket};
 use axum::Router;
@@ -29,21 +29,21 @@ pub const PHOTOGRAPH: usize = 64 << 20;
 const FILE: u64 = 256 << 20;
 /// The largest text frame, in bytes.
 pub const FRAME: usize = 16 << 20;
-/// The most sockets that are open at a time.
+/// Maximum open sockets.
 const SOCKETS: usize = 64;
-/// The most photographs that are received at a time.
+/// Maximum concurrent uploads of photographs.
 const UPLOADS: usize = 4;
 
-/// What the page may load: its own files, and pictures that it made itself.
+/// The content security policy: the page may load its own files and pictures that it made.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; \
      img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
      frame-ancestors 'none'";
 
-/// What all handlers share.
+/// The state that all handlers share.
 #[derive(Clone)]
 pub struct Server {
     /// Does what is asked.
-    pub desk: Arc<Desk>,
+    pub app: Arc<App>,
     guard: Arc<Guard>,
     /// Where the files of the page are, if not in this program.
     page: Option<Arc<std::path::Path>>,
@@ -55,9 +55,9 @@ pub struct Server {
 type Asked = Query<HashMap<String, String>>;
 
 /// Makes the routes of the server.
-pub fn router(desk: Arc<Desk>, guard: Arc<Guard>, page: Option<Arc<std::path::Path>>) -> Router {
+pub fn router(app: Arc<App>, guard: Arc<Guard>, page: Option<Arc<std::path::Path>>) -> Router {
     let server = Server {
-        desk,
+        app,
         guard,
         page,
         sockets: Arc::new(Semaphore::new(SOCKETS)),
@@ -133,7 +133,7 @@ const BUSY: Refusal =
 fn opened<F>(
     server: Server,
     upgrade: WebSocketUpgrade,
-    serve: impl FnOnce(WebSocket, Arc<Desk>) -> F + Send + 'static,
+    serve: impl FnOnce(WebSocket, Arc<App>) -> F + Send + 'static,
 ) -> Response
 where
     F: Future<Output = ()> + Send,
@@ -141,7 +141,7 @@ where
     let Ok(place) = server.sockets.try_acquire_owned() else { return refused(BUSY) };
     let upgrade = upgrade.max_message_size(FRAME).max_frame_size(FRAME);
     upgrade.on_upgrade(move |socket| async move {
-        serve(socket, server.desk).await;
+        serve(socket, server.app).await;
         drop(place);
     })
 }
@@ -173,10 +173,10 @@ async fn take_picture(State(server): State<Server>, asked: Asked, request: Reque
         Ok(bytes) => bytes,
         Err(_) => return refused(large),
     };
-    let desk = Arc::clone(&server.desk);
+    let app = Arc::clone(&server.app);
     let stored = tokio::task::spawn_blocking(move || {
-        let file = desk.folder.store_picture(&name, &bytes)?;
-        desk.tell(serde_json::json!({ "event": "folder" }));
+        let file = app.folder.store_picture(&name, &bytes)?;
+        app.tell(serde_json::json!({ "event": "folder" }));
         Ok::<_, Failure>(file)
     });
     match stored.await {
@@ -187,7 +187,7 @@ async fn take_picture(State(server): State<Server>, asked: Asked, request: Reque
 }
 
 async fn send_file(State(server): State<Server>, Path(path): Path<String>) -> Response {
-    let file = match server.desk.folder.file(&path) {
+    let file = match server.app.folder.file(&path) {
         Ok(file) => file,
         Err(e) => return problem(StatusCode::FORBIDDEN, &e),
     };

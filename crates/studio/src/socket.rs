@@ -1,7 +1,7 @@
 //! The socket of a page: its requests, done side by side, their answers, and events.
 
 use super::answer::{Frame, frame};
-use super::desk::Desk;
+use super::app::App;
 use super::protocol::{self, Call, Request};
 use axum::extract::ws::{Message, WebSocket};
 use futures_util::{SinkExt, StreamExt};
@@ -10,18 +10,18 @@ use std::sync::Arc;
 use tokio::sync::broadcast::error::RecvError;
 use tokio::sync::{Semaphore, mpsc};
 
-/// The most requests of a page that are being done; further ones wait.
+/// Maximum concurrent requests per page; the rest are queued.
 const AT_ONCE: usize = 8;
-/// The most requests of a page that are being done or wait; further ones are refused.
+/// Maximum concurrent and queued requests per page; the rest are refused.
 const PENDING: usize = 256;
-/// The most frames that wait to be sent to a slow page.
+/// Maximum frames queued for a slow page.
 const WAITING: usize = 64;
 
 /// Serves a page until it leaves.
-pub async fn serve(socket: WebSocket, desk: Arc<Desk>) {
+pub async fn serve(socket: WebSocket, app: Arc<App>) {
     let (mut out, mut from) = socket.split();
     let (send, mut frames) = mpsc::channel::<Frame>(WAITING);
-    let mut events = desk.events.subscribe();
+    let mut events = app.events.subscribe();
     let sender = tokio::spawn(async move {
         loop {
             let message = tokio::select! {
@@ -72,7 +72,7 @@ pub async fn serve(socket: WebSocket, desk: Arc<Desk>) {
             }
             continue;
         };
-        let (desk, send, places) = (Arc::clone(&desk), send.clone(), Arc::clone(&places));
+        let (app, send, places) = (Arc::clone(&app), send.clone(), Arc::clone(&places));
         // What ends the work of others does not wait for it.
         let ends = matches!(request.call, Call::Interrupt(_) | Call::Pause(_) | Call::Stop(_));
         tokio::spawn(async move {
@@ -82,7 +82,7 @@ pub async fn serve(socket: WebSocket, desk: Arc<Desk>) {
             };
             // What a session or a run does is not asynchronous, and may take long.
             let done = tokio::task::spawn_blocking(move || {
-                let done = frame(request.id, desk.answer(request.call));
+                let done = frame(request.id, app.answer(request.call));
                 drop(place);
                 done
             });

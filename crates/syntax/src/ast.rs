@@ -136,7 +136,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// Whether it is an expression alone.
+    /// Returns whether it is an expression alone.
     pub fn is_expression(&self) -> bool {
         self.stmts.is_empty() && self.result.is_some()
     }

@@ -27,7 +27,7 @@ pub struct Repl {
     /// Keypoints from a pose detector: a file for the program's one keypoints `data` item
     #[arg(long, value_name = "FILE[#ID]", requires = "program")]
     pub keypoints: Option<String>,
-    /// What the program may read and build
+    /// The files that the program may read, and its limits
     #[command(flatten)]
     pub allowed: Allowed,
     /// The random seed: the same input with the same seed gives the same session

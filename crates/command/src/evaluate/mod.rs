@@ -28,7 +28,7 @@ struct Task {
     case: Case,
     job: Job,
     record: Map<String, Value>,
-    /// Whether the case is selected by `--only`, or by default.
+    /// True if the case is selected by `--only`, or by default.
     chosen: bool,
     /// The result so far; `None` for a case that is neither selected nor done.
     row: Option<Row>,
@@ -229,7 +229,7 @@ impl<'a> Evaluation<'a> {
             let _ = job::record_failure(&dir, &t.record, failure, begun.elapsed().as_secs_f64());
         })?;
         let live = !(self.a.quiet || self.a.json);
-        let manner = RunMode {
+        let mode = RunMode {
             live,
             checkpoint: CHECKPOINT,
             resume: false,
@@ -237,7 +237,7 @@ impl<'a> Evaluation<'a> {
             follow: None,
             stream: false,
         };
-        job::perform(&t.job, &ready, &dir, &t.record, &self.interrupt, manner).map(|_| ())
+        job::perform(&t.job, &ready, &dir, &t.record, &self.interrupt, mode).map(|_| ())
     }
 
     fn rows(&self) -> Vec<Row> {

@@ -7,7 +7,7 @@ use image::imageops::{FilterType, resize};
 use pcadlang_report::pictures::png;
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::files;
-use pcadlang_workbench::session::Picture;
+use pcadlang_workbench::session::ViewPicture;
 use std::path::{Path, PathBuf};
 
 /// The longer side of a picture in pixels, on terminals that show pixels.
@@ -41,7 +41,7 @@ pub fn graphics_from_env(variable: impl Fn(&str) -> Option<String>, is_terminal:
 
 /// Returns the characters that show a picture. If the user named a file, or the terminal
 /// cannot show pictures, the picture is written to a file instead.
-pub fn shown(picture: &Picture, graphics: Graphics) -> Result<String, Failure> {
+pub fn shown(picture: &ViewPicture, graphics: Graphics) -> Result<String, Failure> {
     let pixels = picture.pixels();
     let encoded = |p: &RgbImage| png(p).map_err(|e| plain(e.to_string()));
     if picture.file.is_some() || graphics == Graphics::File {

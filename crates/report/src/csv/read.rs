@@ -7,7 +7,7 @@ use crate::ChainDraws;
 use pcadlang_inference::draws::{Column, DrawRow, merged};
 use std::io::BufRead;
 
-/// What a file of draws has beside its numbers.
+/// The contents of a file of draws, apart from its numbers.
 #[derive(Default)]
 pub(crate) struct Contents {
     /// The lines of comments.

@@ -47,7 +47,7 @@ pub struct Film {
     /// The longer side of the pictures in pixels
     #[arg(long, default_value_t = 480, value_parser = clap::value_parser!(u32).range(16..=2048))]
     pub size: u32,
-    /// The most states on the way from the prior
+    /// Maximum states on the way from the prior
     #[arg(long, default_value_t = 60, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub states: u32,
     /// End with the best state over the photograph, without a turn around it

@@ -11,7 +11,7 @@ use crate::reopening::date::readable;
 use crate::reopening::reopened::{PROGRAM, quoted};
 use image::RgbImage;
 use pcadlang_inference::draws::KernelStats;
-use pcadlang_report::html::{Page, Picture, page};
+use pcadlang_report::html::{Figure, Page, page};
 use pcadlang_report::pictures::{jpeg, png};
 use pcadlang_report::{Mode, Quantity, RunDir, seconds};
 use serde::de::DeserializeOwned;
@@ -151,7 +151,7 @@ fn settings(run: &Value) -> Vec<(&'static str, String)> {
 }
 
 /// Returns the pictures in a folder, grouped by what is to be compared side by side.
-fn pictures(dir: &RunDir, modes: bool) -> Vec<Vec<Picture<'static>>> {
+fn pictures(dir: &RunDir, modes: bool) -> Vec<Vec<Figure<'static>>> {
     let mut groups =
         vec![vec![PHOTO], vec![OVER], vec![JOINTS], vec![COVERED], vec![EDGES, CONTOURS]];
     groups.extend(modes.then(|| vec![MODES]));
@@ -159,7 +159,7 @@ fn pictures(dir: &RunDir, modes: bool) -> Vec<Vec<Picture<'static>>> {
         let file = std::fs::read(dir.file(name)).ok()?;
         // Lines stay sharp, everything else is a photograph or lies over one.
         let file = if lines { fitted(file)? } else { sized(file)? };
-        Some(Picture { caption, file, lines })
+        Some(Figure { caption, file, lines })
     };
     let found =
         groups.into_iter().map(|group| group.into_iter().filter_map(of).collect::<Vec<_>>());

@@ -23,7 +23,7 @@ pub struct Label {
     pub span: Span,
     /// The text; may be empty.
     pub text: String,
-    /// Whether the span is the location of the error itself (underlined with `^`) or
+    /// True for the location of the error itself (underlined with `^`), false for a span that
     /// helps to explain it (`-`).
     pub primary: bool,
 }
@@ -33,7 +33,7 @@ pub struct Label {
 pub struct Diagnostic {
     /// The severity.
     pub severity: Severity,
-    /// What is wrong, in one line.
+    /// The error, in one line.
     pub message: String,
     /// The relevant spans of the source.
     pub labels: Vec<Label>,

@@ -1,4 +1,4 @@
-//! What may be written at a place in a program.
+//! Completion: the words that fit at a position in a program.
 
 use super::Analysis;
 use super::names::BindingKind;
@@ -12,13 +12,13 @@ use std::path::Path;
 pub struct Candidate {
     /// The word.
     pub word: String,
-    /// What it is.
+    /// Its kind.
     pub kind: CandidateKind,
     /// One line about it.
     pub detail: String,
 }
 
-/// What a candidate is.
+/// The kind of a candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CandidateKind {
     /// A name of the program.

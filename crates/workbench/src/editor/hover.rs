@@ -1,4 +1,4 @@
-//! What there is to say of the name under a cursor.
+//! The description of the name under a cursor.
 
 use super::Analysis;
 use super::names::Binding;

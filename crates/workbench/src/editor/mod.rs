@@ -1,4 +1,4 @@
-//! What an editor asks about the text of a program: its mistakes, what a name means and
+//! Answers to an editor about the text of a program: its mistakes, what a name means and
 //! where else it stands, what may be written here, which choices there are. Nothing is
 //! run; protocols are the command's affair (`pcadlang lsp`).
 

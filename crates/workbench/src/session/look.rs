@@ -1,8 +1,9 @@
 //! `:trace`: the choices of the state.
 
-use super::reply::{Reply, Trouble};
+use super::reply::Reply;
 use super::shown;
 use super::state::{INPUT, Session};
+use crate::failure::{Failure, plain};
 use pcadlang_engine::lang::plan::{Formula, Selection};
 use pcadlang_engine::trace::{Address, Selector, Target};
 use pcadlang_inference::{not_a_selection, selected};
@@ -18,7 +19,7 @@ pub(super) const ROWS: usize = 40;
 
 impl Session {
     /// `:trace [sel]`.
-    pub(super) fn show_trace(&mut self, selection: &str) -> Result<Reply, Trouble> {
+    pub(super) fn show_trace(&mut self, selection: &str) -> Result<Reply, Failure> {
         let all = selection.is_empty();
         let targets = if all { self.by_address(&Selector::All) } else { self.select(selection)? };
         let t = &self.trace;
@@ -51,11 +52,11 @@ impl Session {
 
     /// Returns the choices of a typed selection, in order of address. An empty selection
     /// is an error.
-    pub(super) fn select(&mut self, text: &str) -> Result<Vec<(Address, Target)>, Trouble> {
+    pub(super) fn select(&mut self, text: &str) -> Result<Vec<(Address, Target)>, Failure> {
         let text = &addressed(text);
         let mut sources = SourceMap::new();
         let file = sources.add(INPUT, text);
-        let wrong = |diagnostics, sources| Trouble::from(Error { diagnostics, sources });
+        let wrong = |diagnostics, sources| Failure::from(Error { diagnostics, sources });
         let expr = match parse_expr(text, file) {
             Ok(e) => e,
             Err(errors) => {
@@ -86,7 +87,7 @@ impl Session {
         }
         let known: Vec<String> =
             self.trace.all_targets().iter().map(|t| self.trace.address(*t).to_string()).collect();
-        let trouble = Trouble::plain(format!("`{text}` selects no choice in the trace"));
+        let trouble = plain(format!("`{text}` selects no choice in the trace"));
         Err(match nearest(text, known.iter().map(String::as_str)) {
             Some(n) => trouble.hint(format!("did you mean `{n}`?")),
             None if known.is_empty() => {

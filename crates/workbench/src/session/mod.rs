@@ -28,6 +28,7 @@ mod shown;
 mod state;
 mod why;
 
+pub use crate::failure::Failure;
 pub use background::Status;
 pub use change::Scores;
 pub use choices::{ChoiceRow, Marks, from_json, to_json};
@@ -35,9 +36,9 @@ pub use command::{COMMANDS, Command};
 pub use complete::Completion;
 pub use export::{exported, exported_operand};
 pub use layers::{Layer, photo_contours};
-pub use picture::{Picture, detected, over};
+pub use picture::{ViewPicture, detected, over};
 pub use render::observed_image;
-pub use reply::{Reply, Request, Trouble};
+pub use reply::{Reply, Request};
 pub use shown::short;
 pub use state::Session;
 
@@ -46,7 +47,7 @@ impl Session {
     ///
     /// # Errors
     /// If the entry has errors or was stopped; nothing has changed then.
-    pub fn enter(&mut self, text: &str) -> Result<Reply, Trouble> {
+    pub fn enter(&mut self, text: &str) -> Result<Reply, Failure> {
         self.clock += 1;
         self.dragged = None;
         let text = text.trim();
@@ -63,7 +64,7 @@ impl Session {
             },
         };
         match done {
-            Err(_) if self.limits.stop.is_asked() => Err(Trouble::Stopped),
+            Err(_) if self.limits.stop.is_asked() => Err(Failure::Interrupted),
             done => done,
         }
     }

@@ -11,9 +11,9 @@ use std::sync::Arc;
 
 /// A view, drawn over the photograph if there is one.
 #[derive(Clone, Debug)]
-pub struct Picture {
+pub struct ViewPicture {
     pub(super) view: Arc<View>,
-    /// What was observed, an [`ImageValue`], if anything was.
+    /// The observed image, an [`ImageValue`], if there is one.
     pub(super) image: Option<Value>,
     /// The file that the user named, if any.
     pub file: Option<PathBuf>,
@@ -22,7 +22,7 @@ pub struct Picture {
 /// The longer side of a picture is scaled down to at most this, in pixels.
 const LARGEST: u32 = 1024;
 
-impl Picture {
+impl ViewPicture {
     /// Renders the picture; its longer side has between [`pictures::LONGER_SIDE`] and
     /// 1024 pixels.
     pub fn pixels(&self) -> RgbImage {

@@ -1,20 +1,21 @@
 //! `:why @a`: what a choice depends on, and what depends on it.
 
 use super::look::{ROWS, more};
-use super::reply::{Reply, Trouble};
+use super::reply::Reply;
 use super::shown;
 use super::state::Session;
+use crate::failure::{Failure, plain};
 use pcadlang_engine::trace::{Effect, Term};
 use pcadlang_report::number;
 use pcadlang_report::table::aligned;
 
 impl Session {
     /// `:why @a`.
-    pub(super) fn why(&mut self, text: &str) -> Result<Reply, Trouble> {
+    pub(super) fn why(&mut self, text: &str) -> Result<Reply, Failure> {
         let found = self.select(text)?;
         let [(address, target)] = &found[..] else {
             let first: Vec<String> = found.iter().take(3).map(|(a, _)| a.to_string()).collect();
-            let trouble = Trouble::plain(format!("`{text}` selects {} choices", found.len()));
+            let trouble = plain(format!("`{text}` selects {} choices", found.len()));
             return Err(trouble.hint(format!("ask for one of them: {}, …", first.join(", "))));
         };
         let (value, score) =

@@ -26,11 +26,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use tokio::sync::broadcast;
 
-/// The most choices in one answer.
+/// Maximum choices in one answer.
 const CHOICES: usize = 2000;
 
-/// What the tabs of all browsers share.
-pub struct Desk {
+/// The state that the tabs of all browsers share.
+pub struct App {
     /// The opened folder.
     pub folder: Folder,
     /// The open sessions.
@@ -41,7 +41,7 @@ pub struct Desk {
     pub events: broadcast::Sender<String>,
 }
 
-impl Desk {
+impl App {
     /// Does what is asked, which may take as long as the program does.
     pub fn answer(&self, call: Call) -> Result<Answer, Failure> {
         let json = match call {
