@@ -68,7 +68,7 @@ impl ChainDraws {
     }
 }
 
-/// Converts all chains to the union of their columns, with NaN where a draw has no value.
+/// Converts all chains to the union of their columns, with NaN where a draw lacks one.
 pub fn widen(chains: &mut [ChainDraws]) {
     let Some(all) = common(chains) else { return };
     chains.iter_mut().filter(|c| !c.rows.is_empty()).for_each(|c| c.widen(all.clone()));
@@ -98,7 +98,7 @@ pub struct Quantity {
 
 /// Returns every scalar quantity of the chains with its summary, starting with the log
 /// joint density (`log_joint`). The columns are the union of those of all chains, with
-/// NaN where a draw has no value. A column that repeats the log joint density is left
+/// NaN where a draw lacks one. A column that repeats the log joint density is left
 /// out, and so are the log densities of single observed values.
 pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     let mut chains = Cow::Borrowed(chains);

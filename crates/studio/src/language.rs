@@ -40,7 +40,7 @@ impl Language {
         Ok(Language { connection: client, folder: folder.to_owned() })
     }
 
-    /// Passes on a message of the page. One that is no message, or is about a document
+    /// Passes on a message of the page. One that is not a message, or is about a document
     /// outside the folder, is ignored. Returns whether the server is still there.
     pub fn send(&self, text: &str) -> bool {
         let Some(message) = self.message(text) else { return true };

@@ -72,7 +72,7 @@ pub fn summary(run: &Run) -> Result<Value, Failure> {
         let found = modes(&all, None);
         let chains = run.job.as_ref().map_or(1, |j| j.sampling.chains()) as usize;
         let said = match run.watched() {
-            // What has not converged yet is no news.
+            // Chains that have not converged yet are expected.
             Some(_) => Vec::new(),
             None => warnings(&all, &found, &[], chains),
         };

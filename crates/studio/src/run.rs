@@ -70,7 +70,7 @@ struct Inner {
     clock: Clock,
 }
 
-/// A clock that stands still while a run is paused.
+/// A clock that is stopped while a run is paused.
 #[derive(Clone, Copy, Debug, Default)]
 struct Clock {
     before: Duration,

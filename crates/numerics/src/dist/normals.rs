@@ -39,7 +39,7 @@ impl Normals {
         let known = |x: f64| if width == 0 { x } else { f64::NAN };
         Some(Normals {
             mean: all.iter().map(|d| d.location()).collect(),
-            // NaN is no standard deviation, so the first one differs.
+            // NaN is not a standard deviation, so the first one differs.
             sd: all.iter().map(|d| known(d.scale())).collect(),
             log_norm: all.iter().map(|d| d.log_norm()).collect(),
             z: Vec::new(),
