@@ -2,7 +2,7 @@
 
 use super::Analysis;
 use super::names::BindingKind;
-use super::words::{self, KEYWORDS, KINDS};
+use super::words::{self, KINDS};
 use pcadlang_engine::lang::builtins::Kind;
 use pcadlang_syntax::{Class, STATEMENTS, classes};
 use std::path::Path;
@@ -159,7 +159,8 @@ fn keywords() -> impl Iterator<Item = Candidate> {
         kind: CandidateKind::Keyword,
         detail: s.doc.to_owned(),
     });
-    statements.chain(KEYWORDS.iter().map(|k| plain((*k).to_owned(), CandidateKind::Keyword)))
+    let others = pcadlang_syntax::keywords().filter(|k| STATEMENTS.iter().all(|s| s.name != *k));
+    statements.chain(others.map(|k| plain(k.to_owned(), CandidateKind::Keyword)))
 }
 
 fn plain(word: String, kind: CandidateKind) -> Candidate {
