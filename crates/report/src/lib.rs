@@ -10,14 +10,12 @@
 
 mod aligned;
 mod atomic_write;
-mod chain_file;
 pub mod checkpoint;
 pub mod csv;
 mod draws;
 pub mod embedded;
 pub mod evaluation;
 pub mod film;
-mod hash;
 pub mod html;
 pub mod inference;
 mod modes;
@@ -34,15 +32,14 @@ pub mod zarr;
 
 pub use aligned::align;
 pub use atomic_write::write_file;
-pub use chain_file::{ChainFile, ChainFiles};
+pub use checkpoint::{bytes_hash, text_hash};
 pub use draws::widen;
 pub use draws::{ChainDraws, Quantity, quantities};
-pub use hash::{bytes_hash, text_hash};
 pub use modes::{DISAGREE, Mode, modes, modes_table};
 pub use moments::{Moments, Point};
 pub use number::{number, r_hat_text, seconds};
 pub use pcadlang_inference::diagnostics::Summary;
 pub use reread::{rename, reread};
 pub use rundir::{RunDir, RunDirError};
-pub use sinks::{Memory, Tee};
+pub use sinks::{ChainFile, ChainFiles, Memory, Tee};
 pub use warnings::warnings;

@@ -15,7 +15,7 @@ use crate::progress::{self, Ending};
 use crate::ready::Ready;
 use crate::reopening::page::write_page;
 use crate::reopening::reopened::{PROGRAM, TRACES, TRAJECTORY, arguments};
-use crate::reopening::{date, seen};
+use crate::reopening::{reopened, seen};
 use crate::stream::Streamed;
 use crate::watched::Watched;
 use crate::{edges, people};
@@ -189,7 +189,7 @@ pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value>
     let record = json!({
         "version": env!("CARGO_PKG_VERSION"),
         "state": "running",
-        "begun": date::now(),
+        "begun": reopened::now(),
         "program": job.inputs.program,
         "program_hash": program_hash,
         "inputs_hash": inputs,

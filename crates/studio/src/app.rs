@@ -1,11 +1,9 @@
 //! Does what the page asks: every method of the protocol, by the sessions of the prompt and
 //! the runs of `pcadlang run`.
 
-use super::answer::Answer;
 use super::folder::Folder;
-use super::layout::{self, finite};
-use super::protocol::{self, Call, StateName};
-use super::results;
+use super::protocol::{self, Answer, Call, StateName};
+use super::results::{self, finite};
 use super::runs::Runs;
 use super::sessions::{OpenSession, Sessions, job_of};
 use super::states::{no_view, picture};
@@ -110,7 +108,7 @@ impl App {
             Call::Compare(c) => results::compared(&*self.runs.get(&c.a)?, &*self.runs.get(&c.b)?)?,
             Call::Export(e) => {
                 let run = self.runs.get(&e.run)?;
-                let file = super::exports::export(&run, &e.kind)?;
+                let file = super::results::export(&run, &e.kind)?;
                 json!({ "file": format!("{}/{file}", run.name) })
             }
             Call::Picture(p) => return self.picture(p),
@@ -311,7 +309,7 @@ impl App {
     fn mesh(&self, m: &protocol::Mesh) -> Result<Answer, Failure> {
         let limit = m.limit;
         let (header, data) = self.with_view(&m.state, move |view, log_joint| {
-            let (mut header, data) = layout::mesh(view.solid(), limit).map_err(plain)?;
+            let (mut header, data) = results::mesh(view.solid(), limit).map_err(plain)?;
             header.insert("log_joint".into(), finite(log_joint));
             Ok((header, data))
         })?;

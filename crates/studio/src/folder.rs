@@ -1,6 +1,6 @@
 //! The files of the opened folder: programs, pictures, evaluations.
 
-use super::layout::finite;
+use super::results::finite;
 use pcadlang_engine::lang::reach::path_within;
 use pcadlang_library::shipped;
 use pcadlang_report::evaluation::MARK;

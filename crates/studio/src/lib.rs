@@ -7,25 +7,18 @@
 #[macro_use]
 extern crate pcadlang_runs;
 
-mod answer;
 mod app;
 mod args;
-mod assets;
-mod exports;
 mod folder;
 mod guard;
 mod language;
-mod language_socket;
-mod layout;
 mod listener;
-mod pictures;
 mod protocol;
 mod results;
 mod run;
 mod runs;
 mod server;
 mod sessions;
-mod slots;
 mod socket;
 mod states;
 mod ticker;

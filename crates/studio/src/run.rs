@@ -1,7 +1,7 @@
 //! One run: under way, with its chains in memory, or ended, with what its folder holds.
 
-use super::layout::finite;
-use super::slots::Slots;
+use super::results::finite;
+use super::runs::Slots;
 use pcadlang_inference::Progress;
 use pcadlang_report::RunDir;
 use pcadlang_runs::args::Job;
@@ -57,7 +57,7 @@ pub struct Run {
     stop: AtomicBool,
     inner: Mutex<Inner>,
     /// Pictures of its states, see `states`.
-    pub(super) pictures: super::pictures::Pictures,
+    pub(super) pictures: super::states::Pictures,
 }
 
 struct Inner {
@@ -94,7 +94,7 @@ impl Clock {
 impl Run {
     /// A run that is about to begin.
     pub fn new(name: &str, dir: RunDir, job: Job, session: u64) -> Run {
-        let record = json!({ "begun": pcadlang_runs::reopening::date::now() });
+        let record = json!({ "begun": pcadlang_runs::reopening::reopened::now() });
         Run::of(name, dir.path(), Some(job), Some(session), RunStatus::Waiting, record)
     }
 

@@ -2,9 +2,8 @@
 //! opened folder.
 
 use super::app::App;
-use super::assets;
 use super::guard::{Guard, Refusal};
-use super::{language_socket, socket};
+use super::{language, socket};
 use axum::Router;
 use axum::body::{Body, Bytes};
 use axum::extract::ws::{WebSocket, WebSocketUpgrade};
@@ -18,6 +17,7 @@ use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use pcadlang_runs::failure::Failure;
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::future::Future;
 use std::sync::Arc;
@@ -105,7 +105,7 @@ async fn guarded(State(server): State<Server>, request: Request, next: Next) -> 
 }
 
 async fn asset(server: &Server, name: &str) -> Response {
-    match assets::find(name, server.page.as_deref()) {
+    match find(name, server.page.as_deref()) {
         Some((kind, bytes)) => {
             ([(CONTENT_TYPE, kind)], Body::from(Bytes::from_owner(bytes))).into_response()
         }
@@ -151,7 +151,7 @@ async fn open_socket(State(server): State<Server>, upgrade: WebSocketUpgrade) ->
 }
 
 async fn open_language(State(server): State<Server>, upgrade: WebSocketUpgrade) -> Response {
-    opened(server, upgrade, language_socket::serve)
+    opened(server, upgrade, language::serve)
 }
 
 fn problem(status: StatusCode, problem: &Failure) -> Response {
@@ -212,4 +212,23 @@ async fn send_file(State(server): State<Server>, Path(path): Path<String>) -> Re
         response.headers_mut().insert(CONTENT_DISPOSITION, value);
     }
     response
+}
+
+/// Name, type and contents of each file.
+const ASSETS: [(&str, &str, &[u8]); 4] = [
+    ("index.html", "text/html; charset=utf-8", include_bytes!("../../../web/dist/index.html")),
+    ("studio.js", "text/javascript; charset=utf-8", include_bytes!("../../../web/dist/studio.js")),
+    ("studio.css", "text/css; charset=utf-8", include_bytes!("../../../web/dist/studio.css")),
+    ("licences.txt", "text/plain; charset=utf-8", include_bytes!("../../../web/dist/licences.txt")),
+];
+
+/// Returns the type and the contents of a file of the page. They are read from `folder`
+/// if one is given, for those who work on the page.
+pub fn find(
+    name: &str,
+    folder: Option<&std::path::Path>,
+) -> Option<(&'static str, Cow<'static, [u8]>)> {
+    let (name, kind, bytes) = ASSETS.iter().find(|(n, ..)| *n == name)?;
+    let read = folder.and_then(|f| std::fs::read(f.join(name)).ok());
+    Some((kind, read.map_or(Cow::Borrowed(*bytes), Cow::Owned)))
 }

@@ -2,7 +2,7 @@
 //! is done in turn.
 
 use super::folder::is_picture;
-use super::layout::finite;
+use super::results::finite;
 use pcadlang_engine::lang::reach::path_within;
 use pcadlang_engine::trace::Stop;
 use pcadlang_library::Program;

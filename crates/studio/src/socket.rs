@@ -1,8 +1,7 @@
 //! The socket of a page: its requests, done side by side, their answers, and events.
 
-use super::answer::{Frame, frame};
 use super::app::App;
-use super::protocol::{self, Call, Request};
+use super::protocol::{self, Call, Frame, Request, frame};
 use axum::extract::ws::{Message, WebSocket};
 use futures_util::{SinkExt, StreamExt};
 use serde_json::json;

@@ -1,7 +1,7 @@
 //! Directives: they are added to the program, and the trace is rebuilt with the choices
 //! that it had.
 
-use super::export::{exported, exported_operand};
+use super::files::{exported, exported_operand};
 use super::redefine::{
     Key, Space, forgotten, items, key, to_forget, users, with_item, without_item,
 };
