@@ -19,7 +19,6 @@ mod run;
 mod runs;
 mod server;
 mod sessions;
-mod socket;
 mod states;
 mod ticker;
 

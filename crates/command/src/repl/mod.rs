@@ -3,11 +3,7 @@
 mod blocks;
 mod edit;
 mod editor;
-mod iterm;
-mod kitty;
 mod pictures;
-#[cfg(test)]
-mod testing;
 
 use super::args::{Graphics, Inputs, Job, Repl, Sampling};
 use editor::{Lines, Typed, is_whole};

@@ -1,7 +1,9 @@
-//! Shows pictures in the terminal, or writes them to files.
+//! Shows pictures in the terminal, or writes them to files. kitty takes a PNG in base64, in
+//! chunks of 4096 characters; iTerm2, and others like it, an inline file in base64.
 
 use super::super::args::Graphics;
-use super::{blocks, iterm, kitty};
+use super::blocks;
+use base64::prelude::{BASE64_STANDARD, Engine as _};
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use pcadlang_report::pictures::png;
@@ -59,8 +61,8 @@ pub fn shown(picture: &ViewPicture, graphics: Graphics) -> Result<String, Failur
     let fitting =
         || resize(&pixels, scaled(pixels.width()), scaled(pixels.height()), FilterType::Triangle);
     Ok(match graphics {
-        Graphics::Kitty => kitty::encode(&encoded(&fitting())?),
-        Graphics::Iterm => iterm::encode(&encoded(&fitting())?),
+        Graphics::Kitty => kitty(&encoded(&fitting())?),
+        Graphics::Iterm => iterm(&encoded(&fitting())?),
         _ => blocks::encode(&pixels, columns(), graphics == Graphics::Blocks),
     })
 }
@@ -79,9 +81,39 @@ fn unused(folder: &Path) -> PathBuf {
     (1..10_000).map(name).find(|p| !p.exists()).unwrap_or_else(|| name(10_000))
 }
 
+/// The maximum length of a chunk; the protocol requires a multiple of 4.
+const CHUNK: usize = 4096;
+
+/// Encodes a PNG for display at the cursor.
+fn kitty(png: &[u8]) -> String {
+    let data = BASE64_STANDARD.encode(png);
+    let chunks: Vec<&str> =
+        data.as_bytes().chunks(CHUNK).filter_map(|c| std::str::from_utf8(c).ok()).collect();
+    let mut out = String::with_capacity(data.len() + 64 * chunks.len());
+    for (i, chunk) in chunks.iter().enumerate() {
+        let more = u8::from(i + 1 < chunks.len());
+        // The first chunk has the format (PNG) and the action (display), and turns off
+        // responses.
+        let head = if i == 0 { "f=100,a=T,q=2," } else { "" };
+        out += &format!("\x1b_G{head}m={more};{chunk}\x1b\\");
+    }
+    out.push('\n');
+    out
+}
+
+/// Encodes a PNG for display at the cursor.
+fn iterm(png: &[u8]) -> String {
+    format!(
+        "\x1b]1337;File=inline=1;size={};preserveAspectRatio=1:{}\x07\n",
+        png.len(),
+        BASE64_STANDARD.encode(png)
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use image::Rgb;
 
     #[test]
     fn terminals_are_told_by_their_environment() {
@@ -111,5 +143,55 @@ mod tests {
             graphics_from_env(|n| (n == "TERM").then(|| "xterm-kitty".to_owned()), false),
             Graphics::File
         );
+    }
+
+    #[test]
+    fn what_kitty_is_sent_is_the_picture() {
+        let picture = noise(90, 70);
+        let sent = kitty(&png_of(&picture));
+        let mut data = String::new();
+        let parts: Vec<&str> = sent.trim_end().split("\x1b\\").filter(|p| !p.is_empty()).collect();
+        assert!(parts.len() > 1, "the picture takes several chunks");
+        for (i, part) in parts.iter().enumerate() {
+            let (control, chunk) = part.strip_prefix("\x1b_G").unwrap().split_once(';').unwrap();
+            assert_eq!(control.ends_with("m=1"), i + 1 < parts.len());
+            assert_eq!(control.contains("a=T"), i == 0);
+            assert!(chunk.len() <= CHUNK && (chunk.len() % 4 == 0));
+            data += chunk;
+        }
+        let back =
+            image::load_from_memory(&BASE64_STANDARD.decode(&data).unwrap()).unwrap().to_rgb8();
+        assert_eq!(back, picture);
+    }
+
+    #[test]
+    fn what_iterm_is_sent_is_the_picture() {
+        let picture = noise(31, 17);
+        let png = png_of(&picture);
+        let sent = iterm(&png);
+        let body = sent
+            .strip_prefix("\x1b]1337;File=")
+            .and_then(|s| s.trim_end().strip_suffix('\x07'))
+            .unwrap();
+        let (settings, data) = body.split_once(':').unwrap();
+        assert!(settings.contains("inline=1") && settings.contains(&format!("size={}", png.len())));
+        assert_eq!(
+            image::load_from_memory(&BASE64_STANDARD.decode(data).unwrap()).unwrap().to_rgb8(),
+            picture
+        );
+    }
+
+    /// Returns a picture of pseudo-random pixels.
+    fn noise(width: u32, height: u32) -> RgbImage {
+        RgbImage::from_fn(width, height, |x, y| {
+            let h = (x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(40_503).wrapping_mul(x + 7))
+                .wrapping_mul(2_246_822_519);
+            Rgb([(h >> 24) as u8, (h >> 16) as u8, (h >> 8) as u8])
+        })
+    }
+
+    /// Encodes a picture as a PNG.
+    fn png_of(picture: &RgbImage) -> Vec<u8> {
+        pcadlang_report::pictures::png(picture).unwrap()
     }
 }
