@@ -1,6 +1,5 @@
 //! `pcadlang repl`: a session at a prompt, or a piped script.
 
-mod blocks;
 mod edit;
 mod editor;
 mod pictures;

@@ -4,8 +4,6 @@
 
 mod analysis;
 mod completion;
-mod hints;
-mod hover;
 mod names;
 mod resolve;
 mod symbols;
@@ -13,6 +11,5 @@ pub mod words;
 
 pub use analysis::{Analysis, CannotRename};
 pub use completion::{Candidate, CandidateKind};
-pub use hints::Hint;
 pub use names::{Binding, BindingId, BindingKind, Names, Occurrence};
-pub use symbols::{Piece, PieceKind};
+pub use symbols::{Hint, Piece, PieceKind};
