@@ -150,12 +150,7 @@ mod tests {
     #[test]
     fn the_log_joint_density_is_there_once() {
         let row = |x: f64, said: f64| DrawRow {
-            chain: 0,
-            draw: 0,
-            step: 0,
             log_joint: x,
-            log_prior: 0.0,
-            log_likelihood: 0.0,
             values: vec![said, 7.0],
             ..DrawRow::default()
         };
@@ -182,12 +177,9 @@ mod tests {
     #[test]
     fn vectors_become_elements() {
         let row = |draw, x: f64| DrawRow {
-            chain: 0,
             draw,
             step: draw,
             log_joint: -x,
-            log_prior: 0.0,
-            log_likelihood: 0.0,
             values: vec![x, 2.0 * x, 3.0 * x],
             ..DrawRow::default()
         };

@@ -254,7 +254,6 @@ mod tests {
             let (log_prior, log_likelihood, values) = (0.0, -x, vec![x, 2.0 * x]);
             memory
                 .draw(&DrawRow {
-                    chain: 0,
                     draw,
                     step: draw,
                     log_joint: -x,
@@ -279,12 +278,9 @@ mod tests {
         let (a, b) = (Memory::default(), Memory::default());
         let mut tee = Tee(vec![Box::new(a.clone()), Box::new(b.clone())]);
         let row = DrawRow {
-            chain: 0,
-            draw: 0,
             step: 1,
             log_joint: -1.0,
             log_prior: -1.0,
-            log_likelihood: 0.0,
             values: vec![3.0],
             ..DrawRow::default()
         };

@@ -315,29 +315,20 @@ fn number<'s>(lexer: &mut logos::Lexer<'s, Token<'s>>) -> Option<f64> {
 
 /// The keywords by their class in editors. The grammars for TextMate, Pygments and tree-sitter
 /// are tested to have the same.
-pub const KEYWORDS: [(&str, &[&str]); 4] = [
-    ("constant", &["true", "false"]),
-    ("operator", &["or", "and", "not"]),
-    (
-        "control",
-        &[
-            "for", "in", "if", "else", "warmup", "repeat", "every", "mix", "stop", "when",
-            "collect", "propose",
-        ],
-    ),
+pub const KEYWORDS: [(&str, &str); 4] = [
+    ("constant", "true false"),
+    ("operator", "or and not"),
+    ("control", "for in if else warmup repeat every mix stop when collect propose"),
     (
         "declaration",
-        &[
-            "include", "param", "data", "fn", "kernel", "infer", "report", "export", "as", "to",
-            "assume", "let", "observe", "with", "coarse", "predict", "factor", "force", "freeze",
-            "forget", "sample",
-        ],
+        "include param data fn kernel infer report export as to assume let observe with \
+         coarse predict factor force freeze forget sample",
     ),
 ];
 
 /// Returns all keywords.
 pub fn keywords() -> impl Iterator<Item = &'static str> {
-    KEYWORDS.iter().flat_map(|(_, words)| words.iter().copied())
+    KEYWORDS.iter().flat_map(|(_, words)| words.split(' '))
 }
 
 /// Returns whether a text is a keyword.

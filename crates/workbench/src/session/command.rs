@@ -157,10 +157,10 @@ impl Session {
             return Ok(Reply::text(text));
         }
         let names: Vec<String> = self.topics().collect();
-        let trouble = plain(format!("there is no statement, built-in or command `{name}`"));
+        let failure = plain(format!("there is no statement, built-in or command `{name}`"));
         Err(match nearest(name, names.iter().map(String::as_str)) {
-            Some(n) => trouble.hint(format!("did you mean `{n}`?")),
-            None => trouble.hint("`:help` lists the commands, `pcadlang doc` all built-ins"),
+            Some(n) => failure.hint(format!("did you mean `{n}`?")),
+            None => failure.hint("`:help` lists the commands, `pcadlang doc` all built-ins"),
         })
     }
 }

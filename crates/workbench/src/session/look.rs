@@ -72,8 +72,8 @@ impl Session {
             let value = self.value_of(&print_expr(key)).map_err(|e| failed = Some(e));
             Formula::constant(value.unwrap_or_default(), key.span)
         });
-        if let Some(trouble) = failed {
-            return Err(trouble);
+        if let Some(failure) = failed {
+            return Err(failure);
         }
         let selector = selection
             .map_err(not_a_selection)
@@ -87,13 +87,13 @@ impl Session {
         }
         let known: Vec<String> =
             self.trace.all_targets().iter().map(|t| self.trace.address(*t).to_string()).collect();
-        let trouble = plain(format!("`{text}` selects no choice in the trace"));
+        let failure = plain(format!("`{text}` selects no choice in the trace"));
         Err(match nearest(text, known.iter().map(String::as_str)) {
-            Some(n) => trouble.hint(format!("did you mean `{n}`?")),
+            Some(n) => failure.hint(format!("did you mean `{n}`?")),
             None if known.is_empty() => {
-                trouble.hint("the trace has no choices yet: assume x ~ normal(0, 1)")
+                failure.hint("the trace has no choices yet: assume x ~ normal(0, 1)")
             }
-            None => trouble.hint("`:trace` shows all of them"),
+            None => failure.hint("`:trace` shows all of them"),
         })
     }
 
@@ -128,8 +128,8 @@ impl Session {
         let found = self.select(text)?;
         let [(address, target)] = &found[..] else {
             let first: Vec<String> = found.iter().take(3).map(|(a, _)| a.to_string()).collect();
-            let trouble = plain(format!("`{text}` selects {} choices", found.len()));
-            return Err(trouble.hint(format!("ask for one of them: {}, …", first.join(", "))));
+            let failure = plain(format!("`{text}` selects {} choices", found.len()));
+            return Err(failure.hint(format!("ask for one of them: {}, …", first.join(", "))));
         };
         let (value, score) =
             (shown::short(&self.trace.value(*target)), number(self.trace.score_of(*target)));

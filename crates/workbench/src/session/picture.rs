@@ -99,10 +99,10 @@ impl Session {
     fn global(&self, name: &str) -> Result<Operand, Failure> {
         let globals = &self.model.code().globals;
         globals.get(name).copied().ok_or_else(|| {
-            let trouble = plain(format!("there is no `{name}`"));
+            let failure = plain(format!("there is no `{name}`"));
             match nearest(name, globals.keys().map(|n| &**n)) {
-                Some(n) => trouble.hint(format!("did you mean `{n}`?")),
-                None => trouble,
+                Some(n) => failure.hint(format!("did you mean `{n}`?")),
+                None => failure,
             }
         })
     }

@@ -25,11 +25,11 @@ impl Session {
             return Ok(Reply::text(said + &plotted(q)));
         }
         let names = all.iter().map(|q| q.name.as_str());
-        let trouble = plain(format!("the last inference has no quantity `{name}`"));
+        let failure = plain(format!("the last inference has no quantity `{name}`"));
         Err(match nearest(name, names.clone()) {
-            Some(n) => trouble.hint(format!("did you mean `{n}`?")),
+            Some(n) => failure.hint(format!("did you mean `{n}`?")),
             None => {
-                trouble.hint(format!("it has {}", names.take(20).collect::<Vec<_>>().join(", ")))
+                failure.hint(format!("it has {}", names.take(20).collect::<Vec<_>>().join(", ")))
             }
         })
     }

@@ -116,13 +116,13 @@ pub(super) fn to_forget(text: &str, name: &str) -> Result<Key, Failure> {
     if let Some(k) = all.iter().rev().find(|k| *k.1 == *name) {
         return Ok(k.clone());
     }
-    let trouble = plain(format!("the program has no `{name}` to forget"));
+    let failure = plain(format!("the program has no `{name}` to forget"));
     Err(match nearest(name, all.iter().map(|k| &*k.1)) {
-        Some(n) => trouble.hint(format!("did you mean `{n}`?")),
+        Some(n) => failure.hint(format!("did you mean `{n}`?")),
         None if name.starts_with("obs#") => {
-            trouble.hint("an observation is forgotten by its name: observe … as name; or :edit")
+            failure.hint("an observation is forgotten by its name: observe … as name; or :edit")
         }
-        None => trouble.hint("`:list` shows the program"),
+        None => failure.hint("`:list` shows the program"),
     })
 }
 

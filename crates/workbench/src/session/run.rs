@@ -104,8 +104,8 @@ impl Session {
 
     fn launch(&mut self, job: Job, in_background: bool) -> Result<Reply, Failure> {
         if let Some(b) = &self.background {
-            let trouble = plain(format!("run {} is in the background", b.number));
-            return Err(trouble.hint("`:wait` for it, `:stop` it, or `:drop` it first"));
+            let failure = plain(format!("run {} is in the background", b.number));
+            return Err(failure.hint("`:wait` for it, `:stop` it, or `:drop` it first"));
         }
         let note = job.note.clone();
         let run = self.begin(job)?;
@@ -214,10 +214,10 @@ impl Session {
         };
         if !Arc::ptr_eq(&run.base, &self.model) {
             self.last = Some(finished);
-            let trouble =
+            let failure =
                 plain(format!("the program has changed since run {} started", run.number));
             return Err(
-                trouble.hint("its state cannot be used; `:plot` and `:profile` show what it did")
+                failure.hint("its state cannot be used; `:plot` and `:profile` show what it did")
             );
         }
         let mut last = result.last;

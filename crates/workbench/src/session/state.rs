@@ -139,8 +139,8 @@ impl Session {
     pub(super) fn permit(&self, path: &str) -> Result<(), Failure> {
         let Some(folder) = &self.confined else { return Ok(()) };
         path_within(folder, path).map(|_| ()).map_err(|_| {
-            let trouble = plain(format!("{path}: not a file of this folder"));
-            trouble.hint("only files below the current folder can be used here")
+            let failure = plain(format!("{path}: not a file of this folder"));
+            failure.hint("only files below the current folder can be used here")
         })
     }
 
