@@ -55,7 +55,7 @@ pub mod infer {
 }
 
 pub mod report {
-    //! What a run leaves: draws, quantities, folders.
+    //! Results of a run: draws, quantities, folders.
     #![doc = include_str!("guides/report.md")]
 
     pub use pcadlang_report::{ChainDraws, Memory, Quantity, RunDir, RunDirError, Tee, quantities};

@@ -3,7 +3,7 @@
 use crate::errors::{plain, raised};
 use crate::posterior::{Posterior, predictive};
 use crate::python_code::Failure;
-use crate::sampling::{Run, Told};
+use crate::sampling::{ProgressCallback, Run};
 use crate::trace::Trace;
 use crate::values::datum;
 use crate::waiting::wait;
@@ -234,7 +234,7 @@ impl Model {
         let threads = threads.unwrap_or_else(machine).max(1);
         let compiled = Arc::clone(&self.0);
         let run = Run { compiled, chains, steps, warmup, time, seed, first_chain, threads, plan };
-        let told = progress.map(|call| Told { call, live });
+        let told = progress.map(|call| ProgressCallback { call, live });
         py.detach(|| run.watched(told.as_ref()))
     }
 

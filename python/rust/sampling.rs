@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 const ROOM: usize = 4 << 20;
 
 /// Who is told how far a run is.
-pub struct Told {
+pub struct ProgressCallback {
     /// The function of Python.
     pub call: Py<PyAny>,
     /// How often it also gets the best state so far.
@@ -45,7 +45,7 @@ impl Run {
     ///
     /// # Errors
     /// Those of the program, of its hosts, and of the function.
-    pub fn watched(&self, told: Option<&Told>) -> PyResult<Posterior> {
+    pub fn watched(&self, told: Option<&ProgressCallback>) -> PyResult<Posterior> {
         let model = &self.compiled.model;
         let (begun, progress) = (Instant::now(), Arc::new(Progress::default()));
         let best = Arc::new(BestSoFar::new(self.first_chain + self.chains, &progress));

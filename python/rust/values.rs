@@ -111,7 +111,7 @@ fn matrix(rows: &[Value]) -> Option<(usize, usize)> {
 /// Converts a Python object to a value.
 ///
 /// # Errors
-/// TypeError for an object that has no value, ValueError for one nested too deeply.
+/// TypeError for an object without an equivalent, ValueError for one nested too deeply.
 pub fn from_python(object: &Bound<'_, PyAny>) -> PyResult<Value> {
     within(object, DEEPEST)
 }

@@ -6,7 +6,7 @@ use pcadlang_numerics::rng::{Purpose, StreamKey};
 
 /// The outcome of a comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Told {
+pub struct TapeReport {
     /// Whether a tape was recorded.
     pub recorded: bool,
     /// The number of points at which the tape gave a density that was compared.
@@ -20,8 +20,8 @@ pub struct Told {
 
 /// Compares at the present state and at some points around it: densities to the last bit,
 /// gradients up to rounding.
-pub fn compare_tape(trace: &mut Trace, what: &str) -> Told {
-    let mut told = Told::default();
+pub fn compare_tape(trace: &mut Trace, what: &str) -> TapeReport {
+    let mut told = TapeReport::default();
     let mut places: Vec<(Target, Vec<f64>)> = Vec::new();
     for t in trace.all_targets().to_vec() {
         if let Some((y, _)) = trace.free(t).filter(|(y, _)| !y.is_empty()) {

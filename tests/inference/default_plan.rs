@@ -217,7 +217,7 @@ fn vague_priors_start_and_agree_with_quadrature() {
     assert_mean("tau", &d["tau"], 4.501 / (0.001 + squares / 2.0), 0.4);
 }
 
-/// The data say what a step function of a choice is, and its derivative says nothing.
+/// The data say what a step function of a choice is, and its derivative is uninformative.
 #[test]
 fn choices_without_a_derivative_are_moved_by_slice() {
     let text = "assume x ~ normal(0, 2); assume m ~ normal(0, 1);

@@ -218,24 +218,39 @@ fn hovering_explains() {
     assert!(a.hover(byte(text, "2 \"")).is_none());
 }
 
-/// The grammar by which editors colour programs before the server has answered.
+/// The grammars by which editors and notebooks colour programs without the server.
 #[test]
-fn the_textmate_grammar_has_the_keywords_of_the_language() {
-    use pcadlang_syntax::{Class, STATEMENTS, classes};
-    use pcadlang_workbench::editor::words::KEYWORDS;
+fn all_grammars_have_the_keywords_of_the_language() {
+    use pcadlang_syntax::KEYWORDS;
     let text = include_str!("../../editors/vscode/syntaxes/pcad.tmLanguage.json");
     let grammar: serde_json::Value = serde_json::from_str(text).unwrap();
     let patterns = grammar["repository"]["words"]["patterns"].as_array().unwrap();
-    let listed: Vec<&str> = patterns
-        .iter()
-        .filter_map(|p| p["match"].as_str()?.strip_prefix("\\b(?:")?.strip_suffix(")\\b"))
-        .flat_map(|words| words.split('|'))
-        .collect();
-    for word in &listed {
-        assert_eq!(classes(word), [(0..word.len(), Class::Keyword)], "{word} is no keyword");
-    }
-    let all = STATEMENTS.iter().map(|s| s.name).chain(KEYWORDS.iter().copied());
-    for word in all.filter(|w| classes(w)[0].1 == Class::Keyword) {
-        assert!(listed.contains(&word), "{word} is missing");
+    let scopes = [
+        ("constant", "constant.language.pcad"),
+        ("operator", "keyword.operator.word.pcad"),
+        ("control", "keyword.control.pcad"),
+        ("declaration", "keyword.other.pcad"),
+    ];
+    let pygments = include_str!("../../python/src/pcadlang/notebook/words.py");
+    let highlights = include_str!("../../editors/tree-sitter-pcad/queries/highlights.scm");
+    let sorted = |mut words: Vec<&str>| {
+        words.sort_unstable();
+        words.join(" ")
+    };
+    for (class, words) in KEYWORDS {
+        let expected = sorted(words.split(' ').collect());
+        let scope = scopes.iter().find(|(c, _)| *c == class).unwrap().1;
+        let rule = patterns.iter().find(|p| p["name"] == scope).unwrap();
+        let listed = rule["match"].as_str().unwrap();
+        let listed = listed.strip_prefix("\\b(?:").and_then(|l| l.strip_suffix(")\\b")).unwrap();
+        assert_eq!(sorted(listed.split('|').collect()), expected, "TextMate: {class}");
+        let list = format!("\n{}S = [", class.to_uppercase());
+        let list = if class == "control" { "\nCONTROL = [" } else { &list };
+        let list = pygments.split(list).nth(1).and_then(|l| l.split(']').next()).unwrap();
+        let listed = list.split('"').skip(1).step_by(2).collect();
+        assert_eq!(sorted(listed), expected, "Pygments: {class}");
+        for word in words.split(' ').filter(|_| class != "constant") {
+            assert!(highlights.contains(&format!("\"{word}\"")), "tree-sitter: {word}");
+        }
     }
 }

@@ -1,12 +1,12 @@
 //! Tapes of scenes: poses, shapes, placements, landmarks and pictures, and choices stored
 //! as white noise, compared with the traces from which they were recorded.
 
-use crate::common::tape::{Told, compare_tape};
+use crate::common::tape::{TapeReport, compare_tape};
 use pcadlang::{Model, Program};
 
 /// Compares tape and trace at draws from the prior, and sums what was found.
-fn told(model: &Model, draws: u64, what: &str) -> Told {
-    let mut all = Told { recorded: true, ..Told::default() };
+fn told(model: &Model, draws: u64, what: &str) -> TapeReport {
+    let mut all = TapeReport { recorded: true, ..TapeReport::default() };
     for seed in 0..draws {
         let Ok(mut trace) = model.simulate(seed, 0) else { continue };
         let one = compare_tape(&mut trace, what);

@@ -4,7 +4,7 @@
 //!     cargo run --release -p pcadlang-benches --bin joint_speed -- [LOD [JOINT]]     (such as human.lod2 hand_l; all if left out)
 //!
 //! Prints medians of processor-bound wall time on one thread, alternating between full
-//! redraws and joints. Only ratios within one run are meaningful; single times depend on
+//! drawings and joints. Only ratios within one run are meaningful; single times depend on
 //! the machine.
 
 mod shipped;

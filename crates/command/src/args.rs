@@ -3,10 +3,6 @@
 // Comments of arguments are the help that the command prints, not Markdown.
 #![allow(rustdoc::broken_intra_doc_links, rustdoc::invalid_html_tags, rustdoc::bare_urls)]
 
-mod repl;
-
-pub use repl::{Graphics, Repl};
-
 use super::detect::Detect;
 use super::manual::{Completions, Man};
 use clap::{Args, Parser, Subcommand, ValueHint};
@@ -28,7 +24,7 @@ Exit codes: 0 success, 1 an error in the program, its data or a file, 2 an error
 #[derive(Debug, Parser)]
 #[command(name = "pcadlang", version, max_term_width = 100, after_help = EXIT_CODES)]
 pub struct Cli {
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -289,7 +285,7 @@ pub struct Check {
     /// A file for a `data` item; simulated data have the same shape
     #[arg(long, value_name = "[NAME=]FILE")]
     pub observe: Vec<String>,
-    /// What the programs may read and build
+    /// The files that the programs may read, and their limits
     #[command(flatten)]
     pub allowed: Allowed,
 }
@@ -303,7 +299,7 @@ code 1 if a quantity fails or the program cannot be simulated. A correct plan fa
 /// `predict`.
 #[derive(Args, Debug)]
 pub struct Predict {
-    /// What is run
+    /// The run
     #[command(flatten)]
     pub job: Job,
     /// Draw from the prior instead of the posterior
@@ -359,6 +355,64 @@ pub struct Fmt {
     /// Read a program from standard input and write it to standard output
     #[arg(long, conflicts_with = "paths")]
     pub stdin: bool,
+}
+
+/// `repl`.
+#[derive(Args, Debug)]
+#[command(after_help = PROMPT)]
+pub struct Repl {
+    /// The program to start from: a file, the name of a shipped program, or the folder of
+    /// a run (its program, data, settings and best state are loaded). Without it, an
+    /// empty program
+    #[arg(value_name = "PROG|RUN", value_parser = program_name)]
+    pub program: Option<String>,
+    /// Set a `param`; the value is written as in a program; may be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair, requires = "program")]
+    pub sets: Vec<(String, String)>,
+    /// The camera, a JSON file
+    #[arg(long, value_name = "FILE", requires = "program")]
+    pub camera: Option<PathBuf>,
+    /// A file for a `data` item; the name may be omitted if only one item fits
+    #[arg(long, value_name = "[NAME=]FILE", requires = "program")]
+    pub observe: Vec<String>,
+    /// Keypoints from a pose detector: a file for the program's one keypoints `data` item
+    #[arg(long, value_name = "FILE[#ID]", requires = "program")]
+    pub keypoints: Option<String>,
+    /// The files that the program may read, and its limits
+    #[command(flatten)]
+    pub allowed: Allowed,
+    /// The random seed: the same input with the same seed gives the same session
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// How to show pictures [default: detected from the environment]
+    #[arg(long, value_enum)]
+    pub graphics: Option<Graphics>,
+    /// Echo each line with its prompt and continue after errors: a transcript of a
+    /// session
+    #[arg(long)]
+    pub transcript: bool,
+}
+
+/// The help text on terminals, scripts and keys.
+const PROMPT: &str = "\
+A terminal has line editing, history and completion (Tab). Piped input runs as a script, which stops with
+exit code 1 at the first error. Ctrl-C clears the line, ends inference and keeps its draws, or cancels
+another running command, which then changes nothing; Ctrl-D quits.";
+
+/// Ways to show a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Graphics {
+    /// The graphics protocol of kitty and ghostty
+    Kitty,
+    /// The graphics protocol of iTerm2, WezTerm and mintty
+    Iterm,
+    /// Half blocks in 24-bit colours
+    #[value(alias = "sixel")]
+    Blocks,
+    /// Half blocks in 256 colours
+    Blocks256,
+    /// Write pictures to files
+    File,
 }
 
 #[cfg(test)]

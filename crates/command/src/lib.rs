@@ -21,7 +21,7 @@ mod tradeoff;
 use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
 use pcadlang_runs::failure::plain;
-use pcadlang_runs::reopening::{compare, film, report, show};
+use pcadlang_runs::reopening::{compare, film, page, show};
 use pcadlang_runs::term;
 use programs::{calibrate, check, doc, fmt, predict, watch};
 use std::ffi::OsString;
@@ -62,7 +62,7 @@ pub fn command(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Show(a) => show::show(&a),
         Command::Compare(a) => compare::compare(&a),
         Command::Film(a) => film::film(&a),
-        Command::Report(a) => report::report(&a),
+        Command::Report(a) => page::report(&a),
     };
     match done {
         Ok(()) => 0,

@@ -159,7 +159,7 @@ impl Program {
         self.draws.iter().any(|t| t.structure_depends_on(kind))
     }
 
-    /// The continuous choices about which a derivative of the density says nothing, as
+    /// The continuous choices about which a derivative of the density is uninformative, as
     /// selections; `None` if there is no derivative at all, or too many such choices.
     fn rough(&mut self) -> Option<BTreeSet<String>> {
         // Choices without a derivative, those whose derivative did not inform in some draw, and

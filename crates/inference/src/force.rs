@@ -1,5 +1,5 @@
-//! `force @a = v`: sets a choice at the start of a chain, before a state of positive
-//! probability is looked for. Its prior score is kept, and kernels may change it.
+//! `force @a = v`: sets a choice at the start of a chain, before the search for a state
+//! of positive probability. Its prior score is kept, and kernels may change it.
 
 use super::calls::error::fail;
 use super::init::RETRIES;

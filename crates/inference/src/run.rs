@@ -128,7 +128,7 @@ pub enum ChainError {
 
 impl ChainError {
     /// Whether the chain found no state to start from. Another chain may find one, so that this
-    /// is no reason to lose the draws of the others.
+    /// must not lose the draws of the others.
     #[doc(hidden)]
     pub fn is_of_the_start(&self) -> bool {
         match self {

@@ -6,8 +6,8 @@
 //! run, the length of its file of draws, and the chain. A checkpoint can only be resumed
 //! by the version that wrote it, because another version may draw different numbers.
 
-use super::hash::bytes_hash;
 use pcadlang_inference::{Checkpoint, StateError, pack, unpack};
+use pcadlang_numerics::num::fnv1a;
 use serde::{Deserialize, Serialize};
 
 const HEAD: &[u8] = b"pcadlang checkpoint 1\n";
@@ -87,6 +87,17 @@ impl SavedChain {
     }
 }
 
+/// Returns the 64-bit FNV-1a hash of a text as 16 hexadecimal digits. It distinguishes
+/// programs, but is not cryptographic.
+pub fn text_hash(text: &str) -> String {
+    bytes_hash(text.as_bytes())
+}
+
+/// Does the same as [`text_hash`](super::text_hash) for arbitrary bytes.
+pub fn bytes_hash(bytes: &[u8]) -> String {
+    format!("{:016x}", fnv1a(bytes))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -120,5 +131,11 @@ mod tests {
                 "the checkpoint was written by pcadlang 0.0.1; chains may differ under this version, {VERSION}"
             )
         );
+    }
+
+    #[test]
+    fn sixteen_digits() {
+        assert_eq!(text_hash("foobar"), "85944171f73967e8");
+        assert!((0..200u8).all(|b| bytes_hash(&[b]).len() == 16));
     }
 }

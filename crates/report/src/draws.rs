@@ -68,7 +68,7 @@ impl ChainDraws {
     }
 }
 
-/// Converts all chains to the union of their columns, with NaN where a draw has no value.
+/// Converts all chains to the union of their columns, with NaN where a draw lacks one.
 pub fn widen(chains: &mut [ChainDraws]) {
     let Some(all) = common(chains) else { return };
     chains.iter_mut().filter(|c| !c.rows.is_empty()).for_each(|c| c.widen(all.clone()));
@@ -98,7 +98,7 @@ pub struct Quantity {
 
 /// Returns every scalar quantity of the chains with its summary, starting with the log
 /// joint density (`log_joint`). The columns are the union of those of all chains, with
-/// NaN where a draw has no value. A column that repeats the log joint density is left
+/// NaN where a draw lacks one. A column that repeats the log joint density is left
 /// out, and so are the log densities of single observed values.
 pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     let mut chains = Cow::Borrowed(chains);
@@ -150,12 +150,7 @@ mod tests {
     #[test]
     fn the_log_joint_density_is_there_once() {
         let row = |x: f64, said: f64| DrawRow {
-            chain: 0,
-            draw: 0,
-            step: 0,
             log_joint: x,
-            log_prior: 0.0,
-            log_likelihood: 0.0,
             values: vec![said, 7.0],
             ..DrawRow::default()
         };
@@ -182,12 +177,9 @@ mod tests {
     #[test]
     fn vectors_become_elements() {
         let row = |draw, x: f64| DrawRow {
-            chain: 0,
             draw,
             step: draw,
             log_joint: -x,
-            log_prior: 0.0,
-            log_likelihood: 0.0,
             values: vec![x, 2.0 * x, 3.0 * x],
             ..DrawRow::default()
         };

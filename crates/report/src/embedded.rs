@@ -25,7 +25,7 @@ pub struct EmbeddedDraw {
     pub draw: Option<u64>,
     /// Its log joint density.
     pub log_joint: f64,
-    /// What it is called, if not by its place.
+    /// Its label, if it is not named by its position.
     pub label: Option<String>,
     /// Its scene.
     pub solid: Solid,

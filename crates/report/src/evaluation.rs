@@ -6,11 +6,11 @@
 //! same rows. Invariant: the folder holds evaluations only, and its files are complete or
 //! absent.
 
-use super::RunDirError;
-use super::atomic_write::{is_partial, write_atomically};
+use super::atomic_write::is_partial;
+use super::{RunDir, RunDirError};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The file that marks the folder of an evaluation.
 pub const MARK: &str = "evaluation.json";
@@ -19,48 +19,25 @@ pub const TABLE: &str = "table.md";
 /// The keypoints of all cases.
 pub const PREDICTIONS: &str = "predictions.json";
 
-/// The folder of an evaluation.
-#[derive(Clone, Debug)]
-pub struct EvaluationDir {
-    path: PathBuf,
-}
-
-impl EvaluationDir {
-    /// Creates the folder, or opens one that an earlier evaluation left; nothing is
-    /// removed.
-    ///
-    /// # Errors
-    /// Returns an error if it cannot be created, or holds files but no evaluation.
-    pub fn open(path: &Path) -> Result<EvaluationDir, RunDirError> {
-        let io = |error| RunDirError::Io { path: path.to_owned(), error };
-        std::fs::create_dir_all(path).map_err(io)?;
-        let (mut marked, mut occupied) = (false, false);
-        for entry in std::fs::read_dir(path).map_err(io)? {
-            let name = entry.map_err(io)?.file_name();
-            let name = name.to_str().unwrap_or("");
-            marked |= name == MARK;
-            occupied |= !is_partial(name);
-        }
-        if occupied && !marked {
-            return Err(RunDirError::NoEvaluation(path.to_owned()));
-        }
-        Ok(EvaluationDir { path: path.to_owned() })
+/// Creates the folder of an evaluation, or opens one that an earlier evaluation left;
+/// nothing is removed.
+///
+/// # Errors
+/// Returns an error if it cannot be created, or holds files but no evaluation.
+pub fn open(path: &Path) -> Result<RunDir, RunDirError> {
+    let io = |error| RunDirError::Io { path: path.to_owned(), error };
+    std::fs::create_dir_all(path).map_err(io)?;
+    let (mut marked, mut occupied) = (false, false);
+    for entry in std::fs::read_dir(path).map_err(io)? {
+        let name = entry.map_err(io)?.file_name();
+        let name = name.to_str().unwrap_or("");
+        marked |= name == MARK;
+        occupied |= !is_partial(name);
     }
-
-    /// Returns the path of a file in the folder.
-    pub fn file(&self, name: &str) -> PathBuf {
-        self.path.join(name)
+    if occupied && !marked {
+        return Err(RunDirError::NoEvaluation(path.to_owned()));
     }
-
-    /// Writes a file under a temporary name, then renames it.
-    ///
-    /// # Errors
-    /// Returns an error if it cannot be written; an older file of the same name is then
-    /// kept.
-    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), RunDirError> {
-        write_atomically(&self.path, name, bytes)
-            .map_err(|error| RunDirError::Io { path: self.file(name), error })
-    }
+    Ok(RunDir::of(path))
 }
 
 /// The results of a case.
@@ -249,11 +226,11 @@ mod tests {
         let _ = std::fs::remove_dir_all(&base);
         std::fs::create_dir_all(&base).unwrap();
         std::fs::write(base.join(".evaluation.json.partial"), b"{").unwrap();
-        EvaluationDir::open(&base).unwrap().write(MARK, b"{}").unwrap();
+        open(&base).unwrap().write(MARK, b"{}").unwrap();
         std::fs::write(base.join("notes.txt"), b"x").unwrap();
-        EvaluationDir::open(&base).unwrap();
+        open(&base).unwrap();
         std::fs::remove_file(base.join(MARK)).unwrap();
-        assert!(matches!(EvaluationDir::open(&base), Err(RunDirError::NoEvaluation(_))));
+        assert!(matches!(open(&base), Err(RunDirError::NoEvaluation(_))));
         std::fs::remove_dir_all(&base).unwrap();
     }
 }

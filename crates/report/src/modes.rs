@@ -26,7 +26,7 @@ pub struct Mode {
     /// Its probability among the modes ([`Weighed::probabilities`]), if it can be
     /// estimated.
     pub probability: Option<f64>,
-    /// Whether the probability is based on estimates of the evidence, rather than on the
+    /// True if the probability is based on estimates of the evidence, rather than on the
     /// assumption that all modes are equally wide.
     pub by_evidence: bool,
     /// The logarithm of its evidence and its standard error, if there is an estimate

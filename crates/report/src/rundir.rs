@@ -63,13 +63,17 @@ pub enum RunDirError {
     },
 }
 
-/// The folder of a run.
+/// The folder of a run, or of an evaluation.
 #[derive(Clone, Debug)]
 pub struct RunDir {
     path: PathBuf,
 }
 
 impl RunDir {
+    pub(super) fn of(path: &Path) -> RunDir {
+        RunDir { path: path.to_owned() }
+    }
+
     /// Creates the folder. If it holds an earlier run, the files of that run are removed
     /// first, so that draws and pictures of two runs are never mixed.
     ///
@@ -101,7 +105,7 @@ impl RunDir {
             if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) }
                 .map_err(io)?;
         }
-        Ok(RunDir { path: path.to_owned() })
+        Ok(RunDir::of(path))
     }
 
     /// Creates the first of the folders `name`, `name-2`, `name-3`, … that does not exist
@@ -121,7 +125,7 @@ impl RunDir {
     /// Returns an error if it does not hold a run.
     pub fn open(path: &Path) -> Result<RunDir, RunDirError> {
         match path.join(MARK).is_file() {
-            true => Ok(RunDir { path: path.to_owned() }),
+            true => Ok(RunDir::of(path)),
             false => Err(RunDirError::NoRun(path.to_owned())),
         }
     }

@@ -3,23 +3,16 @@
 // Comments of arguments are the help that the command prints, not Markdown.
 #![allow(rustdoc::broken_intra_doc_links, rustdoc::invalid_html_tags, rustdoc::bare_urls)]
 
-mod live;
-mod reopening;
-mod values;
-
-pub use live::Live;
-pub use reopening::{Compare, Film, Report, Show};
-pub use values::{duration, limit, pair};
-
 use crate::files::program_name;
 use crate::people::PersonArgs;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueHint};
 use pcadlang_workbench::tradeoff::Quality;
 use std::path::PathBuf;
+use std::str::FromStr;
 use std::time::Duration;
 
-/// What a program is given.
+/// The inputs of a program.
 #[derive(Args, Clone, Debug)]
 pub struct Inputs {
     /// The program: a file, the name of a shipped one such as lathe.pcad, or - for the
@@ -40,12 +33,12 @@ pub struct Inputs {
     /// Whom it is about
     #[command(flatten)]
     pub who: PersonArgs,
-    /// What it may read and build
+    /// The files it may read, and its limits
     #[command(flatten)]
     pub allowed: Allowed,
 }
 
-/// What a program may read and build.
+/// The files that a program may read, and its limits.
 #[derive(Args, Clone, Debug, Default)]
 pub struct Allowed {
     /// A folder the program may read files from, besides its own; may be repeated
@@ -162,7 +155,7 @@ impl Job {
 /// `run`.
 #[derive(Args, Debug)]
 pub struct Run {
-    /// What is run
+    /// The run
     #[command(flatten)]
     pub job: Job,
     /// The folder for results [default: runs/PROG]
@@ -197,4 +190,166 @@ pub struct Run {
     /// Print nothing but errors
     #[arg(long)]
     pub quiet: bool,
+}
+
+/// Where states are sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Live {
+    /// A folder.
+    Folder(PathBuf),
+    /// A server, `HOST:PORT`, and a path on it.
+    Server(String, String),
+}
+
+impl FromStr for Live {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Live, String> {
+        if text.starts_with("https://") {
+            return Err("only http:// addresses can be reached".to_owned());
+        }
+        let Some(rest) = text.strip_prefix("http://") else {
+            return Ok(Live::Folder(PathBuf::from(text)));
+        };
+        let (host, path) = rest.split_once('/').unwrap_or((rest, ""));
+        if host.is_empty() || host.contains(|c: char| c.is_whitespace() || c == '@') {
+            return Err(format!("`{text}` has no host"));
+        }
+        let port = host.rsplit_once(':').is_some_and(|(_, p)| p.parse::<u16>().is_ok());
+        let host = if port { host.to_owned() } else { format!("{host}:80") };
+        let path = path.trim_end_matches('/');
+        let path = if path.is_empty() { String::new() } else { format!("/{path}") };
+        Ok(Live::Server(host, path))
+    }
+}
+
+/// `show`.
+#[derive(Args, Debug)]
+pub struct Show {
+    /// The folder of the run
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
+    /// Which kept state, numbered from 1 as listed by `show RUN` [default: the best
+    /// state]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub draw: Option<u32>,
+    /// The file to write: the picture over the photograph (.png) or the mesh (.obj,
+    /// .glb). Without it, the choices are printed
+    #[arg(short, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// `compare`.
+#[derive(Args, Debug)]
+pub struct Compare {
+    /// The folder of a run
+    #[arg(value_name = "A")]
+    pub a: PathBuf,
+    /// The folder of another run
+    #[arg(value_name = "B")]
+    pub b: PathBuf,
+    /// A file to write their overlays to, side by side (.png)
+    #[arg(short, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// `film`.
+#[derive(Args, Debug)]
+pub struct Film {
+    /// The folder of the run
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
+    /// The file to write: an animated picture (.png), or meshes with their animation (.glb;
+    /// a body keeps its skin). A name without an ending is a folder for one PNG file per
+    /// picture
+    #[arg(short, value_name = "FILE|DIR", default_value = "film.png")]
+    pub out: PathBuf,
+    /// The longer side of the pictures in pixels
+    #[arg(long, default_value_t = 480, value_parser = clap::value_parser!(u32).range(16..=2048))]
+    pub size: u32,
+    /// Maximum states on the way from the prior
+    #[arg(long, default_value_t = 60, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub states: u32,
+    /// End with the best state over the photograph, without a turn around it
+    #[arg(long)]
+    pub no_turn: bool,
+}
+
+/// `report`.
+#[derive(Args, Debug)]
+pub struct Report {
+    /// The folder of the run
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
+}
+
+/// Parses `NAME=VALUE`.
+pub fn pair(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() => {
+            Ok((name.trim().to_owned(), value.trim().to_owned()))
+        }
+        _ => Err("expected NAME=VALUE".into()),
+    }
+}
+
+/// Parses a limit on evaluation, `NAME=N`.
+pub fn limit(text: &str) -> Result<(String, u64), String> {
+    let (name, number) = pair(text)?;
+    let number = number.parse().map_err(|_| format!("expected a whole number, got {number}"))?;
+    pcadlang_engine::trace::Limits::default().with(&name, number)?;
+    Ok((name, number))
+}
+
+/// Parses a duration; without a unit, it is in seconds.
+pub fn duration(text: &str) -> Result<Duration, String> {
+    let wrong = || "expected a time such as 10s, 2m, 1h or 500ms".to_owned();
+    let at = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
+    let (number, unit) = text.split_at(at);
+    let x: f64 = number.trim().parse().map_err(|_| wrong())?;
+    let scale = match unit.trim() {
+        "ms" => 1e-3,
+        "s" | "" => 1.0,
+        "m" | "min" => 60.0,
+        "h" => 3600.0,
+        _ => return Err(wrong()),
+    };
+    let seconds = x * scale;
+    if seconds.is_finite() && (0.0..1e9).contains(&seconds) {
+        Ok(Duration::from_secs_f64(seconds))
+    } else {
+        Err(wrong())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_or_an_address() {
+        let of = |text: &str| text.parse::<Live>();
+        let server = |host: &str, path: &str| Ok(Live::Server(host.into(), path.into()));
+        assert_eq!(of("out/live"), Ok(Live::Folder("out/live".into())));
+        assert_eq!(of("http://127.0.0.1:9000"), server("127.0.0.1:9000", ""));
+        assert_eq!(of("http://viewer/a/b/"), server("viewer:80", "/a/b"));
+        assert!(
+            of("https://viewer").is_err() && of("http:///x").is_err() && of("http://a b").is_err()
+        );
+    }
+
+    #[test]
+    fn values_are_read() {
+        assert_eq!(duration("500ms"), Ok(Duration::from_millis(500)));
+        assert_eq!(duration("1.5m"), Ok(Duration::from_secs(90)));
+        assert_eq!(duration("7"), Ok(Duration::from_secs(7)));
+        assert!(
+            duration("soon").is_err()
+                && duration("-1s").is_err()
+                && duration("1d").is_err()
+                && duration("1e300h").is_err()
+        );
+        assert_eq!(pair("a = 1"), Ok(("a".into(), "1".into())));
+        assert!(pair("a").is_err() && pair("=1").is_err());
+    }
 }

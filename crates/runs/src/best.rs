@@ -27,7 +27,7 @@ use std::time::{Duration, Instant};
 /// The time until the best state is written first.
 const FIRST: Duration = Duration::from_millis(200);
 
-/// The best state as it was rendered.
+/// The facts about the best state that its rendering gives.
 #[derive(Default)]
 pub struct Shown {
     /// Its view.

@@ -24,7 +24,7 @@ use std::sync::Arc;
 
 /// The file.
 pub const SCENE: &str = "scene.json";
-/// The most draws, beside the best state.
+/// Maximum draws, in addition to the best state.
 const DRAWS: usize = 40;
 /// The longer side of the pictures, in pixels, and their quality.
 const SIDE: u32 = 512;

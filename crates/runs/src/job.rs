@@ -17,7 +17,7 @@ pub use crate::progress::Interrupt;
 use crate::progress::{self, Ending};
 use crate::reopening::page::write_page;
 use crate::reopening::reopened::{PROGRAM, TRACES, TRAJECTORY, arguments};
-use crate::reopening::{date, seen};
+use crate::reopening::{reopened, seen};
 use crate::stream::Streamed;
 use crate::watched::Watched;
 use crate::{files, inputs};
@@ -60,7 +60,7 @@ pub struct Outcome {
     pub every: u64,
     /// Wall time until everything except the page was written.
     pub seconds: f64,
-    /// The user interrupted the run.
+    /// True if the user interrupted the run.
     pub interrupted: bool,
 }
 
@@ -136,7 +136,7 @@ pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value>
     let record = json!({
         "version": env!("CARGO_PKG_VERSION"),
         "state": "running",
-        "begun": date::now(),
+        "begun": reopened::now(),
         "program": job.inputs.program,
         "program_hash": program_hash,
         "inputs_hash": inputs,
@@ -198,17 +198,17 @@ pub const CHECKPOINT: Duration = Duration::from_secs(10);
 /// How a run is carried out; its draws do not depend on this.
 #[derive(Clone, Debug)]
 pub struct RunMode {
-    /// Progress is shown.
+    /// True if progress is shown.
     pub live: bool,
     /// The time between checkpoints.
     pub checkpoint: Duration,
-    /// The run in the folder is resumed.
+    /// True to resume the run in the folder.
     pub resume: bool,
     /// How many complete states are kept.
     pub keep: u32,
     /// Where the best state is sent as it improves.
     pub follow: Option<Live>,
-    /// Draws are printed as they are made.
+    /// True if draws are printed as they are made.
     pub stream: bool,
 }
 

@@ -8,8 +8,8 @@ pub mod print;
 
 pub mod args;
 pub mod best;
+pub mod drawing_budget;
 pub mod embedded;
-pub mod failure;
 pub mod files;
 pub mod inputs;
 pub mod job;
@@ -19,10 +19,11 @@ pub mod people;
 pub mod places;
 pub mod progress;
 pub mod quality;
-pub mod ration;
 pub mod reopening;
 pub mod resume;
 pub mod scene;
 pub mod stream;
 pub mod term;
 pub mod watched;
+
+pub use pcadlang_workbench::failure;

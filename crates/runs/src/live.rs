@@ -2,10 +2,10 @@
 //! sent to an address.
 
 use crate::args::Live;
+use crate::drawing_budget::DrawingBudget;
 use crate::failure::{Failure, plain};
 use crate::inputs::Ready;
 use crate::progress::Ending;
-use crate::ration::Ration;
 use crate::scene;
 use crate::watched::Watched;
 use pcadlang_inference::BestState;
@@ -45,15 +45,16 @@ impl Live {
     /// Sends the best state whenever it has improved, until the chains end, and once more
     /// then. A viewer that cannot be reached misses states; the run goes on.
     pub fn follow(&self, ready: &Ready, watched: &Watched, ending: &Ending) {
-        let (mut sent, mut ration, mut ended) = (f64::NEG_INFINITY, Ration::default(), false);
+        let (mut sent, mut drawing_budget, mut ended) =
+            (f64::NEG_INFINITY, DrawingBudget::default(), false);
         while !ended {
-            ended = ending.within(ration.rest().max(LOOK));
+            ended = ending.within(drawing_budget.rest().max(LOOK));
             let Some(best) = watched.best.state().filter(|b| b.log_joint > sent) else { continue };
             let begun = Instant::now();
             // What cannot be drawn now may be drawable later.
             let _ = self.show(ready, watched, &best);
             sent = best.log_joint;
-            ration.took(begun.elapsed());
+            drawing_budget.took(begun.elapsed());
         }
     }
 

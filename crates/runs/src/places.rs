@@ -8,7 +8,7 @@ use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use pcadlang_inference::{BestSoFar, BestState};
 use pcadlang_library::Model;
-use pcadlang_report::pictures::{captioned_sheet, png};
+use pcadlang_report::pictures::{contact_sheet, png};
 use pcadlang_report::{Mode, RunDir};
 use pcadlang_scene::vision::Photo;
 use pcadlang_workbench::session::over;
@@ -25,8 +25,6 @@ const SIDE: u32 = 384;
 pub struct ModeBest {
     /// The number of the mode, from 1.
     number: usize,
-    /// The caption of its picture.
-    said: String,
     best: Arc<BestState>,
 }
 
@@ -37,22 +35,11 @@ pub fn name(mode: usize) -> String {
 
 /// Returns the best state of each mode.
 pub fn best_of_each(modes: &[Mode], best: &BestSoFar) -> Vec<ModeBest> {
-    let chains: usize = modes.iter().map(|m| m.chains.len()).sum();
     let state = |m: &Mode| {
         let all = m.chains.iter().filter_map(|c| best.of_chain(c.checked_sub(1)?));
         all.max_by(|a, b| a.log_joint.total_cmp(&b.log_joint))
     };
-    let place = |(i, m): (usize, &Mode)| {
-        let best = state(m)?;
-        let probability = m.probability.map_or(String::new(), |p| format!(", {:.0}%", 100.0 * p));
-        let said = format!(
-            "{}: {} of {chains}{probability}, {:.0}",
-            i + 1,
-            m.chains.len(),
-            best.log_joint
-        );
-        Some(ModeBest { number: i + 1, said, best })
-    };
+    let place = |(i, m): (usize, &Mode)| Some(ModeBest { number: i + 1, best: state(m)? });
     modes.iter().take(SHOWN).enumerate().filter_map(place).collect()
 }
 
@@ -64,7 +51,7 @@ pub fn sized(picture: &RgbImage, side: u32) -> RgbImage {
     resize(picture, w, h, FilterType::Triangle)
 }
 
-/// Writes `modes.png`, and `mode-N.png` for each mode, if there are several modes and the
+/// Writes `modes.png`, in the order of the table of modes, and `mode-N.png` for each mode, if there are several modes and the
 /// program has a view. Files of an earlier part of the run are removed.
 pub fn show_places(
     dir: &RunDir,
@@ -81,7 +68,7 @@ pub fn show_places(
             _ => {}
         }
     }
-    let (mut pictures, mut captions) = (Vec::new(), Vec::new());
+    let mut pictures = Vec::new();
     for place in places {
         let draws = scene::predictive(seed, 3);
         let mut trace = scene::rebuilt(model, &place.best.choices, draws)?;
@@ -90,7 +77,6 @@ pub fn show_places(
         let size = photo.map_or((camera.width, camera.height), |p| (p.width(), p.height()));
         let picture = over(&view, photo.map(Photo::rgb), size);
         pictures.push(sized(&picture, SIDE));
-        captions.push(place.said.clone());
     }
     if pictures.len() < 2 {
         return Ok(());
@@ -99,5 +85,5 @@ pub fn show_places(
     for (place, picture) in places.iter().zip(&pictures) {
         write_in(dir, &name(place.number), &encoded(picture)?)?;
     }
-    write_in(dir, "modes.png", &encoded(&captioned_sheet(&pictures, COLUMNS, &captions))?)
+    write_in(dir, "modes.png", &encoded(&contact_sheet(&pictures, COLUMNS))?)
 }

@@ -1,4 +1,4 @@
-//! What others may look at while the chains of a run are under way.
+//! The state that other threads may read while the chains of a run are under way.
 
 use crate::args::Job;
 use pcadlang_inference::{BestSoFar, KeptTraces, Progress, Trajectory};

@@ -23,7 +23,7 @@ pub struct Studio {
     /// Set a `param`; the value is written as in a program; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair, requires = "program")]
     pub sets: Vec<(String, String)>,
-    /// What the program may read and build
+    /// The files that the program may read, and its limits
     #[command(flatten)]
     pub allowed: Allowed,
     /// The port; 0 takes any that is free

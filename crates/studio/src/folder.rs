@@ -1,6 +1,6 @@
 //! The files of the opened folder: programs, pictures, evaluations.
 
-use super::layout::finite;
+use super::results::finite;
 use pcadlang_engine::lang::reach::path_within;
 use pcadlang_library::shipped;
 use pcadlang_report::evaluation::MARK;
@@ -183,7 +183,7 @@ impl Folder {
     }
 }
 
-/// Whether a file name is that of a picture.
+/// Returns whether a file name is that of a picture.
 pub fn is_picture(name: &str) -> bool {
     let end = Path::new(name).extension().and_then(|e| e.to_str()).map(str::to_lowercase);
     matches!(end.as_deref(), Some("png" | "jpg" | "jpeg"))

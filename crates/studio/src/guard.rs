@@ -7,7 +7,7 @@ use std::fmt::Write;
 /// The bytes of a token.
 const TOKEN: usize = 16;
 
-/// What a request must show.
+/// The credentials that a request must have.
 #[derive(Debug)]
 pub struct Guard {
     token: String,

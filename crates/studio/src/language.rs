@@ -1,11 +1,16 @@
 //! The language server of `pcadlang lsp`, for the editor of the page: the same messages over
 //! a WebSocket. Documents are those of the opened folder, as `file:///studio/NAME`.
 
+use super::app::App;
+use axum::extract::ws::{self, WebSocket};
+use futures_util::{SinkExt, StreamExt};
 use lsp_server::{Connection, Message};
 use pcadlang_engine::lang::reach::path_within;
 use pcadlang_workbench::lsp;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tokio::sync::mpsc;
 
 /// How the page calls the opened folder.
 const FOLDER: &str = "file:///studio/";
@@ -40,7 +45,7 @@ impl Language {
         Ok(Language { connection: client, folder: folder.to_owned() })
     }
 
-    /// Passes on a message of the page. One that is no message, or is about a document
+    /// Passes on a message of the page. One that is not a message, or is about a document
     /// outside the folder, is ignored. Returns whether the server is still there.
     pub fn send(&self, text: &str) -> bool {
         let Some(message) = self.message(text) else { return true };
@@ -60,6 +65,43 @@ impl Language {
 
 fn file_address(folder: &Path) -> String {
     format!("file://{}/", folder.display())
+}
+
+/// Maximum messages queued for a slow page.
+const WAITING: usize = 256;
+
+/// Serves an editor until it leaves.
+pub async fn serve(socket: WebSocket, app: Arc<App>) {
+    let (mut out, mut from) = socket.split();
+    let (send, mut answers) = mpsc::channel::<String>(WAITING);
+    let started = Language::start(app.folder.path(), move |text| {
+        let _ = send.blocking_send(text);
+    });
+    let Ok(server) = started else { return };
+    let server = Arc::new(server);
+    loop {
+        tokio::select! {
+            answer = answers.recv() => match answer {
+                Some(text) => {
+                    if out.send(ws::Message::Text(text.into())).await.is_err() {
+                        break;
+                    }
+                }
+                None => break,
+            },
+            message = from.next() => match message {
+                Some(Ok(ws::Message::Text(text))) => {
+                    let server = Arc::clone(&server);
+                    let sent = tokio::task::spawn_blocking(move || server.send(&text));
+                    if !sent.await.unwrap_or(false) {
+                        break;
+                    }
+                }
+                Some(Ok(ws::Message::Ping(_) | ws::Message::Pong(_) | ws::Message::Binary(_))) => {}
+                _ => break,
+            },
+        }
+    }
 }
 
 #[cfg(test)]

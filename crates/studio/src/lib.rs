@@ -7,31 +7,23 @@
 #[macro_use]
 extern crate pcadlang_runs;
 
-mod answer;
+mod app;
 mod args;
-mod assets;
-mod desk;
-mod exports;
 mod folder;
 mod guard;
 mod language;
-mod language_socket;
-mod layout;
 mod listener;
-mod pictures;
 mod protocol;
 mod results;
 mod run;
 mod runs;
 mod server;
 mod sessions;
-mod slots;
-mod socket;
 mod states;
 mod ticker;
 
+use app::App;
 pub use args::Studio;
-use desk::Desk;
 use folder::Folder;
 use guard::Guard;
 use listener::Bounded;
@@ -47,9 +39,9 @@ use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::sync::broadcast;
 
-/// The least number of runs that work at a time.
+/// Minimum of the default number of concurrent runs.
 const WORKING: usize = 4;
-/// The most events that wait for a slow page.
+/// Maximum events queued for a slow page.
 const EVENTS: usize = 256;
 /// How long runs may take to write their files when the studio ends.
 const FAREWELL: Duration = Duration::from_secs(60);
@@ -77,13 +69,13 @@ async fn serve(a: &Studio) -> Result<(), Failure> {
     let path = std::env::current_dir().map_err(|e| plain(format!("the folder: {e}")))?;
     let interrupt = Interrupt::listen();
     let working = a.jobs.map_or(machine_threads().max(WORKING), |n| n as usize);
-    let desk = Arc::new(Desk {
+    let app = Arc::new(App {
         runs: Runs::new(&path, working, Arc::clone(&interrupt)),
         folder: Folder::new(path),
         sessions: Sessions::default(),
         events: broadcast::channel(EVENTS).0,
     });
-    let session = a.program.as_ref().map(|p| open(&desk, p, a)).transpose()?;
+    let session = a.program.as_ref().map(|p| open(&app, p, a)).transpose()?;
 
     let shown =
         if is_open { bound } else { SocketAddr::new(Ipv4Addr::LOCALHOST.into(), bound.port()) };
@@ -98,8 +90,9 @@ async fn serve(a: &Studio) -> Result<(), Failure> {
     print_line!(
         "Open this address in a browser; Ctrl-C ends the studio, and its runs can be resumed."
     );
-    ticker::start(&desk)?;
-    let app = server::router(Arc::clone(&desk), Arc::new(guard), a.page.as_deref().map(Arc::from));
+    ticker::start(&app)?;
+    let routes =
+        server::router(Arc::clone(&app), Arc::new(guard), a.page.as_deref().map(Arc::from));
     let ended = Arc::clone(&interrupt);
     let over = async move {
         while !ended.asked() {
@@ -107,21 +100,21 @@ async fn serve(a: &Studio) -> Result<(), Failure> {
         }
     };
     tokio::select! {
-        served = async { axum::serve(Bounded::new(listener), app).await } => {
+        served = async { axum::serve(Bounded::new(listener), routes).await } => {
             served.map_err(|e| plain(format!("the server stopped: {e}")))?;
         }
         () = over => {}
     }
     // The interrupt has reached the runs; they write their last checkpoints.
     let begun = std::time::Instant::now();
-    while desk.runs.all().iter().any(|r| r.is_active()) && begun.elapsed() < FAREWELL {
+    while app.runs.all().iter().any(|r| r.is_active()) && begun.elapsed() < FAREWELL {
         tokio::time::sleep(Duration::from_millis(50)).await;
     }
     Ok(())
 }
 
 /// Opens the program or the run of the command line. Returns the number of its session.
-fn open(desk: &Desk, program: &str, a: &Studio) -> Result<u64, Failure> {
+fn open(app: &App, program: &str, a: &Studio) -> Result<u64, Failure> {
     let sets = a.sets.iter().cloned().collect();
     let mut job = job_of(program, &sets, &a.observe);
     job.inputs.allowed = a.allowed.clone();
@@ -130,5 +123,5 @@ fn open(desk: &Desk, program: &str, a: &Studio) -> Result<u64, Failure> {
         false => None,
     };
     let job = run.as_ref().map_or(job, |r| r.job.clone());
-    Ok(desk.sessions.open(job, run)?.id)
+    Ok(app.sessions.open(job, run)?.id)
 }

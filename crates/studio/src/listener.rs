@@ -1,4 +1,4 @@
-//! Accepts connections, a bounded number at a time; further ones are told so and closed.
+//! Accepts connections, up to a maximum; the rest are answered with status 503 and closed.
 
 use axum::serve::Listener;
 use std::future::Future;
@@ -13,7 +13,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::{Sleep, sleep, timeout};
 
-/// The most connections at a time.
+/// Maximum open connections.
 const MOST: usize = 256;
 /// How long a connection may stay silent before its first request.
 const SILENCE: Duration = Duration::from_secs(10);

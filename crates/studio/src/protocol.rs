@@ -1,18 +1,22 @@
 //! The frames that the page and the studio exchange (`docs/reference/studio.md`): requests
 //! are parsed, answers are written. Nothing here does what is asked.
 
-use pcadlang_syntax::diag::nearest;
+use axum::body::Bytes;
+use pcadlang_runs::failure::{Failure, STOPPED};
+use pcadlang_syntax::diag::{Diagnostic, Severity, SourceMap, nearest};
+use pcadlang_workbench::lsp::positions::Encoding;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// A request.
 #[derive(Debug)]
 pub struct Request {
     /// The number that its answer repeats.
     pub id: u64,
-    /// What is asked for.
+    /// The method and its parameters.
     pub call: Call,
 }
 
@@ -21,9 +25,9 @@ pub struct Request {
 pub struct Misunderstood {
     /// Its number, if that much could be read.
     pub id: Option<u64>,
-    /// What is wrong.
+    /// The error.
     pub message: String,
-    /// What may be meant.
+    /// A suggestion.
     pub hint: Option<String>,
 }
 
@@ -69,9 +73,9 @@ pub struct Settings {
 pub struct Viewpoint {
     /// Where the camera is.
     pub eye: [f64; 3],
-    /// What it looks at.
+    /// The point it looks at.
     pub target: [f64; 3],
-    /// What is up.
+    /// The upward direction.
     pub up: [f64; 3],
     /// The angle that the picture's height covers, in degrees.
     pub fov_y: f64,
@@ -85,7 +89,7 @@ macro_rules! methods {
         #[serde(deny_unknown_fields)]
         pub struct $variant { $($(#[$of])* pub $field: $ty),* })*
 
-        /// What is asked for.
+        /// The method and its parameters.
         #[derive(Debug, PartialEq)]
         #[allow(missing_docs)]
         pub enum Call { $($variant($variant)),* }
@@ -106,7 +110,7 @@ macro_rules! methods {
 }
 
 methods! {
-    /// What the opened folder holds.
+    /// The contents of the opened folder.
     Folder = "folder" {}
     /// The text of a program.
     Read = "read" { file: String }
@@ -148,7 +152,7 @@ methods! {
         value: Value,
         #[serde(default)] drag: bool,
     }
-    /// What a choice depends on, and what depends on it.
+    /// The dependencies of a choice, in both directions.
     Why = "why" { session: u64, address: String }
     /// Completes a word at the prompt.
     Complete = "complete" { session: u64, text: String, at: usize }
@@ -167,7 +171,7 @@ methods! {
     Remove = "remove" { run: String }
     /// The kept states of a run.
     Kept = "draws" { run: String }
-    /// What a run has found.
+    /// The summary of a run.
     Summary = "summary" { run: String }
     /// Draws of quantities.
     Quantity = "quantity" { run: String, names: Vec<String> }
@@ -248,6 +252,80 @@ pub fn binary(id: u64, mut header: Map<String, Value>, data: &[u8]) -> Vec<u8> {
     frame.extend_from_slice(header.as_bytes());
     frame.extend_from_slice(data);
     frame
+}
+
+/// An answer to a request.
+pub enum Answer {
+    /// JSON.
+    Json(Value),
+    /// Data with a header.
+    Bytes(Map<String, Value>, Arc<Vec<u8>>),
+}
+
+/// A frame for the page.
+#[derive(Clone, Debug)]
+pub enum Frame {
+    /// JSON.
+    Text(String),
+    /// A binary frame.
+    Binary(Bytes),
+}
+
+/// Returns the frame of an answer to the request with this number.
+pub fn frame(id: u64, done: Result<Answer, Failure>) -> Frame {
+    match done {
+        Ok(Answer::Json(value)) => Frame::Text(result(id, &value)),
+        Ok(Answer::Bytes(header, data)) => Frame::Binary(binary(id, header, &data).into()),
+        Err(failure) => Frame::Text(refusal(id, &failure)),
+    }
+}
+
+fn refusal(id: u64, failure: &Failure) -> String {
+    let error = |message: &str, hint: Option<&str>, diagnostics| {
+        error(Some(id), message, hint, diagnostics)
+    };
+    match failure {
+        Failure::Plain(message, hint) => error(message, hint.as_deref(), json!([])),
+        Failure::Interrupted => error(STOPPED, None, json!([])),
+        Failure::Program(e) => {
+            let first = e.diagnostics.first();
+            let message = first.map_or("", |d| &d.message);
+            let hint = first.and_then(|d| d.hints.first()).map(String::as_str);
+            let all: Vec<Value> = e.diagnostics.iter().map(|d| place(d, &e.sources)).collect();
+            error(message, hint, json!(all))
+        }
+    }
+}
+
+impl From<Value> for Answer {
+    fn from(value: Value) -> Answer {
+        Answer::Json(value)
+    }
+}
+
+/// Returns a diagnostic with its place as the page counts: lines and columns from 0,
+/// columns in UTF-16 units.
+fn place(d: &Diagnostic, sources: &SourceMap) -> Value {
+    let label = d.labels.iter().find(|l| l.primary).or(d.labels.first());
+    let mut said = d.message.clone();
+    if let Some(text) = label.map(|l| &l.text).filter(|t| !t.is_empty()) {
+        said = format!("{said}: {text}");
+    }
+    let severity = match d.severity {
+        Severity::Error => "error",
+        Severity::Warning => "warning",
+        Severity::Note => "note",
+    };
+    let mut out = json!({ "severity": severity, "message": said, "hint": d.hints.first() });
+    if let Some((label, file)) = label.and_then(|l| Some((l, sources.get(l.span.file)?))) {
+        let range = Encoding::Utf16.range(file, label.span);
+        out["file"] = json!(file.name());
+        out["line"] = json!(range.start.line);
+        out["column"] = json!(range.start.character);
+        out["end_line"] = json!(range.end.line);
+        out["end_column"] = json!(range.end.character);
+    }
+    out
 }
 
 #[cfg(test)]

@@ -1,21 +1,25 @@
-//! What a run has found: its draws, its summary, their comparison with another run's, and
-//! files that show it.
+//! Results of a run: its draws, its summary, their comparison with another run's, its meshes,
+//! and files that show it.
 
-use super::layout::finite;
 use super::run::Run;
+use pcadlang_report::embedded::topology;
 use pcadlang_report::{
     ChainDraws, Memory, Quantity, RunDir, modes, quantities, rename, reread, warnings,
 };
+use pcadlang_runs::args::{Film, Report};
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::reopening::compare::Comparison;
+use pcadlang_runs::reopening::page::PAGE;
 use pcadlang_runs::reopening::reopened::{Reopened, quoted};
+use pcadlang_runs::reopening::{film, page};
 use pcadlang_runs::watched::ROOM;
-use serde_json::{Value, json};
+use pcadlang_scene::geom::{GeomError, Solid};
+use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
-/// The most numbers of a chain that are sent for one quantity.
+/// Maximum numbers sent per chain and quantity.
 const NUMBERS: usize = 2000;
-/// The most draws of all chains that a summary of a run under way is made from.
+/// Maximum draws, over all chains, in the summary of a run under way.
 const LIVE: usize = 4000;
 
 /// Returns the draws of a run, from memory or from its folder.
@@ -72,7 +76,7 @@ pub fn summary(run: &Run) -> Result<Value, Failure> {
         let found = modes(&all, None);
         let chains = run.job.as_ref().map_or(1, |j| j.sampling.chains()) as usize;
         let said = match run.watched() {
-            // What has not converged yet is no news.
+            // Chains that have not converged yet are expected.
             Some(_) => Vec::new(),
             None => warnings(&all, &found, &[], chains),
         };
@@ -120,7 +124,7 @@ pub fn quantity(run: &Run, names: &[String]) -> Result<Value, Failure> {
 pub fn compared(a: &Run, b: &Run) -> Result<Value, Failure> {
     let of = |r: &Run| Ok::<_, Failure>((r.record(), summary(r)?));
     let both = Comparison::between([of(a)?, of(b)?]);
-    let of = |q: &pcadlang_runs::reopening::compare::Apart| json!({ "name": q.name, "a": q.a, "b": q.b, "apart": finite(q.apart) });
+    let of = |q: &pcadlang_runs::reopening::compare::QuantityDifference| json!({ "name": q.name, "a": q.a, "b": q.b, "apart": finite(q.difference) });
     let [only_a, only_b] = both.settings();
     Ok(json!({
         "settings": { "a": only_a, "b": only_b },
@@ -138,4 +142,59 @@ pub fn acceptance(run: &Run) -> BTreeMap<String, f64> {
         (tried > 0.0).then_some((c["address"].as_str()?.to_owned(), accepted / tried))
     };
     summary["choices"].as_array().into_iter().flatten().filter_map(rate).collect()
+}
+
+/// Returns a number as JSON: null if it is not finite.
+pub fn finite(x: f64) -> Value {
+    if x.is_finite() { json!(x) } else { Value::Null }
+}
+
+/// Returns the header and the data of a mesh: positions, normals, corners, parts.
+///
+/// # Errors
+/// If the solid has no mesh, or one of more than `limit` triangles.
+pub fn mesh(solid: &Solid, limit: Option<usize>) -> Result<(Map<String, Value>, Vec<u8>), String> {
+    let mesh = solid.to_mesh().map_err(|e: GeomError| e.to_string())?;
+    let triangles = &mesh.topology.triangles;
+    if let Some(most) = limit.filter(|most| triangles.len() > *most) {
+        return Err(format!("the mesh has {} triangles, more than {most}", triangles.len()));
+    }
+    let mut data = Vec::with_capacity(24 * mesh.positions.len() + 14 * triangles.len() + 2);
+    for v in mesh.positions.iter().chain(&mesh.normals) {
+        v.to_array().iter().for_each(|x| data.extend_from_slice(&x.to_le_bytes()));
+    }
+    triangles.iter().flatten().for_each(|i| data.extend_from_slice(&i.to_le_bytes()));
+    let part = |i: usize| mesh.topology.parts.get(i).copied().unwrap_or(0);
+    (0..triangles.len()).for_each(|i| data.extend_from_slice(&part(i).to_le_bytes()));
+    data.resize(data.len().next_multiple_of(4), 0);
+    let Value::Object(header) = json!({
+        "type": "mesh", "vertices": mesh.positions.len(), "triangles": triangles.len(),
+        "topology": topology(&mesh),
+    }) else {
+        return Err("no header".to_owned());
+    };
+    Ok((header, data))
+}
+
+/// Writes a file of a kind, and returns its name.
+pub fn export(run: &Run, kind: &str) -> Result<String, Failure> {
+    if run.is_active() {
+        return Err(plain("the run has not ended").hint("stop it first; it can go on later"));
+    }
+    match kind {
+        PAGE => {
+            page::written(&Report { run: run.folder.clone() })?;
+            Ok(PAGE.to_owned())
+        }
+        "film.png" | "film.glb" => {
+            let out = run.folder.join(kind);
+            let (size, states, no_turn) = (480, 60, false);
+            film::write(&Film { run: run.folder.clone(), out, size, states, no_turn })?;
+            Ok(kind.to_owned())
+        }
+        _ => {
+            let problem = plain(format!("a run cannot be exported as `{kind}`"));
+            Err(problem.hint("film.png, film.glb or report.html"))
+        }
+    }
 }

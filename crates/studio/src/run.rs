@@ -1,7 +1,7 @@
 //! One run: under way, with its chains in memory, or ended, with what its folder holds.
 
-use super::layout::finite;
-use super::slots::Slots;
+use super::results::finite;
+use super::runs::Slots;
 use pcadlang_inference::Progress;
 use pcadlang_report::RunDir;
 use pcadlang_runs::args::Job;
@@ -11,6 +11,7 @@ use pcadlang_runs::job::{self, CHECKPOINT, Interrupt, RunMode};
 use pcadlang_runs::reopening::reopened::Reopened;
 use pcadlang_runs::resume;
 use pcadlang_runs::watched::Watched;
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -21,9 +22,10 @@ use std::time::{Duration, Instant};
 /// How many complete states a run keeps.
 const KEEP: u32 = 100;
 
-/// What a run is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Doing {
+/// The status of a run; lower-case names in the protocol.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RunStatus {
     /// It waits for its turn.
     Waiting,
     /// Its chains run.
@@ -42,50 +44,25 @@ pub enum Doing {
     Interrupted,
 }
 
-impl Doing {
-    /// Its name in the protocol.
-    pub fn name(self) -> &'static str {
-        match self {
-            Doing::Waiting => "waiting",
-            Doing::Running => "running",
-            Doing::Paused => "paused",
-            Doing::Stopping => "stopping",
-            Doing::Done => "done",
-            Doing::Stopped => "stopped",
-            Doing::Failed => "failed",
-            Doing::Interrupted => "interrupted",
-        }
-    }
-}
-
-/// Whether a run that is to go on has begun already.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Begun {
-    /// It was paused, or had never stopped.
-    Already,
-    /// It must be started again.
-    Not,
-}
-
 /// A run.
 pub struct Run {
     /// Its folder, relative to the opened one: its name in the protocol.
     pub name: String,
     /// Its folder.
     pub folder: PathBuf,
-    /// What is run; `None` if its folder does not tell.
+    /// Its inputs and settings; `None` if its folder does not record them.
     pub job: Option<Job>,
     /// The session from which it was begun.
     pub session: Option<u64>,
     stop: AtomicBool,
     inner: Mutex<Inner>,
     /// Pictures of its states, see `states`.
-    pub(super) pictures: super::pictures::Pictures,
+    pub(super) pictures: super::states::Pictures,
 }
 
 struct Inner {
-    doing: Doing,
-    /// What `run.json` says.
+    status: RunStatus,
+    /// The contents of `run.json`.
     record: Value,
     error: Option<String>,
     ready: Option<Arc<Ready>>,
@@ -93,7 +70,7 @@ struct Inner {
     clock: Clock,
 }
 
-/// A clock that stands still while a run is paused.
+/// A clock that is stopped while a run is paused.
 #[derive(Clone, Copy, Debug, Default)]
 struct Clock {
     before: Duration,
@@ -117,21 +94,21 @@ impl Clock {
 impl Run {
     /// A run that is about to begin.
     pub fn new(name: &str, dir: RunDir, job: Job, session: u64) -> Run {
-        let record = json!({ "begun": pcadlang_runs::reopening::date::now() });
-        Run::of(name, dir.path(), Some(job), Some(session), Doing::Waiting, record)
+        let record = json!({ "begun": pcadlang_runs::reopening::reopened::now() });
+        Run::of(name, dir.path(), Some(job), Some(session), RunStatus::Waiting, record)
     }
 
     /// A run that another command has left in a folder.
     pub fn left(name: &str, folder: &Path) -> Result<Run, Failure> {
         let record = resume::run(folder)?;
-        let doing = match record["state"].as_str() {
-            Some("done") => Doing::Done,
-            Some("interrupted") => Doing::Stopped,
-            Some("failed") => Doing::Failed,
-            _ => Doing::Interrupted,
+        let status = match record["state"].as_str() {
+            Some("done") => RunStatus::Done,
+            Some("interrupted") => RunStatus::Stopped,
+            Some("failed") => RunStatus::Failed,
+            _ => RunStatus::Interrupted,
         };
         let job = Reopened::open(folder).ok().map(|r| r.job);
-        Ok(Run::of(name, folder, job, None, doing, record))
+        Ok(Run::of(name, folder, job, None, status, record))
     }
 
     fn of(
@@ -139,13 +116,13 @@ impl Run {
         folder: &Path,
         job: Option<Job>,
         session: Option<u64>,
-        doing: Doing,
+        status: RunStatus,
         record: Value,
     ) -> Run {
         let error = record["error"].as_str().map(str::to_owned);
         let before = Duration::try_from_secs_f64(record["seconds"].as_f64().unwrap_or(0.0));
         let clock = Clock { before: before.unwrap_or_default(), since: None };
-        let inner = Inner { doing, record, error, ready: None, watched: None, clock };
+        let inner = Inner { status, record, error, ready: None, watched: None, clock };
         Run {
             name: name.to_owned(),
             folder: folder.to_owned(),
@@ -161,15 +138,15 @@ impl Run {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns what it is doing.
-    pub fn doing(&self) -> Doing {
-        self.lock().doing
+    /// Returns its status.
+    pub fn status(&self) -> RunStatus {
+        self.lock().status
     }
 
-    /// Whether it has begun, or waits, and has not ended.
+    /// Returns whether it has begun, or waits, and has not ended.
     pub fn is_active(&self) -> bool {
-        use Doing::{Paused, Running, Stopping, Waiting};
-        matches!(self.doing(), Waiting | Running | Paused | Stopping)
+        use RunStatus::{Paused, Running, Stopping, Waiting};
+        matches!(self.status(), Waiting | Running | Paused | Stopping)
     }
 
     /// Returns what its `run.json` says.
@@ -213,14 +190,14 @@ impl Run {
     /// Makes its chains wait.
     pub fn pause(&self) -> Result<(), Failure> {
         let mut inner = self.lock();
-        match inner.doing {
-            Doing::Paused => {}
-            Doing::Running => {
+        match inner.status {
+            RunStatus::Paused => {}
+            RunStatus::Running => {
                 if let Some(w) = &inner.watched {
                     w.progress.pause.begin();
                 }
                 inner.clock.halt();
-                inner.doing = Doing::Paused;
+                inner.status = RunStatus::Paused;
             }
             _ => return Err(plain(format!("{} is not running", self.name))),
         }
@@ -228,35 +205,37 @@ impl Run {
     }
 
     /// Ends a pause. Returns whether the run must be started again instead.
-    pub fn unpause(&self) -> Result<Begun, Failure> {
+    pub fn unpause(&self) -> Result<bool, Failure> {
         let mut inner = self.lock();
-        match inner.doing {
-            Doing::Waiting | Doing::Running => {}
-            Doing::Paused => {
+        match inner.status {
+            RunStatus::Waiting | RunStatus::Running => {}
+            RunStatus::Paused => {
                 if let Some(w) = &inner.watched {
                     w.progress.pause.end();
                 }
                 inner.clock.go();
-                inner.doing = Doing::Running;
+                inner.status = RunStatus::Running;
             }
-            Doing::Stopped | Doing::Interrupted if self.job.is_some() => {
-                inner.doing = Doing::Waiting;
+            RunStatus::Stopped | RunStatus::Interrupted if self.job.is_some() => {
+                inner.status = RunStatus::Waiting;
                 self.stop.store(false, Ordering::SeqCst);
-                return Ok(Begun::Not);
+                return Ok(true);
             }
-            Doing::Stopping => {
+            RunStatus::Stopping => {
                 return Err(plain("the run is still writing its files"));
             }
             _ => return Err(plain(format!("{} has ended", self.name))),
         }
-        Ok(Begun::Already)
+        Ok(false)
     }
 
     /// Ends it at its next step; its draws and a checkpoint are kept.
     pub fn stop(&self) -> Result<(), Failure> {
         let mut inner = self.lock();
-        if !matches!(inner.doing, Doing::Waiting | Doing::Running | Doing::Paused | Doing::Stopping)
-        {
+        if !matches!(
+            inner.status,
+            RunStatus::Waiting | RunStatus::Running | RunStatus::Paused | RunStatus::Stopping
+        ) {
             return Err(plain(format!("{} has ended", self.name)));
         }
         self.stop.store(true, Ordering::SeqCst);
@@ -264,7 +243,7 @@ impl Run {
             w.progress.cancelled.store(true, Ordering::SeqCst);
             w.progress.pause.end();
         }
-        inner.doing = Doing::Stopping;
+        inner.status = RunStatus::Stopping;
         Ok(())
     }
 
@@ -272,14 +251,14 @@ impl Run {
     pub fn work(&self, slots: &Slots, interrupt: &Interrupt, resume: bool) {
         let is_over = || self.stop.load(Ordering::SeqCst) || interrupt.asked();
         let Some(_slot) = slots.take(is_over) else {
-            return self.end(Doing::Stopped, None);
+            return self.end(RunStatus::Stopped, None);
         };
         let done = catch_unwind(AssertUnwindSafe(|| self.perform(interrupt, resume)));
         match done {
-            Ok(Ok(true)) => self.end(Doing::Stopped, None),
-            Ok(Ok(false)) => self.end(Doing::Done, None),
-            Ok(Err(failure)) => self.end(Doing::Failed, Some(failure.to_string())),
-            Err(_) => self.end(Doing::Failed, Some("an internal error".to_owned())),
+            Ok(Ok(true)) => self.end(RunStatus::Stopped, None),
+            Ok(Ok(false)) => self.end(RunStatus::Done, None),
+            Ok(Err(failure)) => self.end(RunStatus::Failed, Some(failure.to_string())),
+            Err(_) => self.end(RunStatus::Failed, Some("an internal error".to_owned())),
         }
     }
 
@@ -309,8 +288,8 @@ impl Run {
         {
             let mut inner = self.lock();
             (inner.ready, inner.watched) = (Some(Arc::clone(&ready)), Some(Arc::clone(&watched)));
-            if inner.doing == Doing::Waiting {
-                inner.doing = Doing::Running;
+            if inner.status == RunStatus::Waiting {
+                inner.status = RunStatus::Running;
             }
             watched.progress.cancelled.store(self.stop.load(Ordering::SeqCst), Ordering::SeqCst);
             inner.record = Value::Object(record.clone());
@@ -328,7 +307,7 @@ impl Run {
     }
 
     /// Notes how it ended, and gives up the memory of its chains.
-    fn end(&self, doing: Doing, error: Option<String>) {
+    fn end(&self, status: RunStatus, error: Option<String>) {
         let left = resume::left(&self.folder);
         let mut inner = self.lock();
         inner.clock.halt();
@@ -337,7 +316,7 @@ impl Run {
         if let Some(record) = left {
             inner.record = record;
         }
-        (inner.doing, inner.error) = (doing, error);
+        (inner.status, inner.error) = (status, error);
         drop(inner);
         self.pictures.forget();
     }
@@ -356,7 +335,7 @@ impl Run {
             "observe": self.job.as_ref().map(|j| &j.observe),
             "set": self.job.as_ref().map(|j| j.inputs.sets.iter().cloned().collect::<std::collections::BTreeMap<_, _>>()),
             "seed": self.job.as_ref().map(|j| j.sampling.seed),
-            "state": inner.doing.name(),
+            "state": inner.status,
             "chains": chains,
             "elapsed": elapsed,
             "limit": limit,
@@ -366,14 +345,14 @@ impl Run {
             "session": self.session,
         });
         let more = match &inner.watched {
-            Some(w) => live(w, inner.doing, chains.unwrap_or(1), elapsed, limit),
+            Some(w) => live(w, inner.status, chains.unwrap_or(1), elapsed, limit),
             None => {
                 let of = |key: &str| -> u64 {
                     let each = record["chains"].as_array();
                     each.into_iter().flatten().filter_map(|c| c[key].as_u64()).sum()
                 };
                 json!({
-                    "phase": inner.doing.name(), "ended": chains, "steps": of("steps") + of("warmup"), "draws": of("draws"),
+                    "phase": inner.status, "ended": chains, "steps": of("steps") + of("warmup"), "draws": of("draws"),
                     "best": record["best_log_joint"], "done": null, "left": null, "rate": null,
                     "revision": record["best_log_joint"].as_f64().map_or(0, revision), "film": null,
                 })
@@ -387,17 +366,17 @@ impl Run {
 }
 
 /// Describes the chains of a run that is under way.
-fn live(w: &Watched, doing: Doing, chains: u32, elapsed: f64, limit: Option<f64>) -> Value {
+fn live(w: &Watched, status: RunStatus, chains: u32, elapsed: f64, limit: Option<f64>) -> Value {
     let p: &Progress = &w.progress;
     let number = |n: &AtomicU32| n.load(Ordering::Relaxed);
     let count = |n: &AtomicU64| n.load(Ordering::Relaxed);
     let (started, ended) = (number(&p.started), number(&p.ended));
-    let phase = match doing {
-        Doing::Paused | Doing::Stopping => doing.name(),
-        _ if started == ended && ended < chains => "starting",
-        _ if started == ended => "writing",
-        _ if number(&p.warming) > 0 => "warm-up",
-        _ => "sampling",
+    let phase = match status {
+        RunStatus::Paused | RunStatus::Stopping => json!(status),
+        _ if started == ended && ended < chains => json!("starting"),
+        _ if started == ended => json!("writing"),
+        _ if number(&p.warming) > 0 => json!("warm-up"),
+        _ => json!("sampling"),
     };
     let (pass, passes) = (count(&p.pass), count(&p.passes));
     let done = match (limit, passes) {

@@ -1,8 +1,7 @@
 //! The runs of the opened folder: those under way, and those that earlier commands left.
 
 use super::protocol::Settings;
-use super::run::{Begun, Run};
-use super::slots::Slots;
+use super::run::Run;
 use pcadlang_engine::lang::reach::path_within;
 use pcadlang_report::RunDir;
 use pcadlang_runs::args::{Job, QualityArg};
@@ -13,10 +12,10 @@ use pcadlang_workbench::tradeoff::Quality;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
-/// The most runs that have begun and not ended.
+/// Maximum unfinished runs.
 const MOST: usize = 64;
 /// The folder of new runs.
 const RUNS: &str = "runs";
@@ -105,7 +104,7 @@ impl Runs {
     /// Goes on with a paused run, or with one that was stopped or interrupted.
     pub fn go_on(&self, name: &str) -> Result<Arc<Run>, Failure> {
         let run = self.get(name)?;
-        if run.unpause()? == Begun::Already {
+        if !run.unpause()? {
             return Ok(run);
         }
         self.start(&run, true)?;
@@ -165,4 +164,59 @@ fn apply(job: &mut Job, settings: &Settings) -> Result<(), Failure> {
         job.inputs.sets.push((name.clone(), value.clone()));
     }
     Ok(())
+}
+
+/// How often a waiting run looks whether it was stopped.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// Places for runs to work.
+pub struct Slots {
+    free: Mutex<usize>,
+    freed: Condvar,
+}
+
+/// A place that is taken until it is dropped.
+pub struct Slot<'a>(&'a Slots);
+
+impl Slots {
+    /// Makes `count` places.
+    pub fn new(count: usize) -> Slots {
+        Slots { free: Mutex::new(count), freed: Condvar::new() }
+    }
+
+    /// Waits for a place; `None` if the run was stopped meanwhile.
+    pub fn take(&self, is_over: impl Fn() -> bool) -> Option<Slot<'_>> {
+        let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
+        while *free == 0 {
+            if is_over() {
+                return None;
+            }
+            let woken = self.freed.wait_timeout(free, PATIENCE);
+            free = woken.unwrap_or_else(PoisonError::into_inner).0;
+        }
+        *free -= 1;
+        Some(Slot(self))
+    }
+}
+
+impl Drop for Slot<'_> {
+    fn drop(&mut self) {
+        *self.0.free.lock().unwrap_or_else(PoisonError::into_inner) += 1;
+        self.0.freed.notify_one();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_free_again_when_it_is_left() {
+        let slots = Slots::new(2);
+        let one = slots.take(|| true).unwrap();
+        let _two = slots.take(|| true).unwrap();
+        assert!(slots.take(|| true).is_none(), "stopped while it waits");
+        drop(one);
+        assert!(slots.take(|| true).is_some());
+    }
 }

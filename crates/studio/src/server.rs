@@ -1,13 +1,13 @@
 //! The web server: the page, the two sockets, photographs that are sent, files of the
 //! opened folder.
 
-use super::assets;
-use super::desk::Desk;
+use super::app::App;
 use super::guard::{Guard, Refusal};
-use super::{language_socket, socket};
+use super::language;
+use super::protocol::{self, Call, Frame, frame};
 use axum::Router;
 use axum::body::{Body, Bytes};
-use axum::extract::ws::{WebSocket, WebSocketUpgrade};
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
 use axum::http::StatusCode;
 use axum::http::header::{
@@ -17,11 +17,15 @@ use axum::http::header::{
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
+use futures_util::{SinkExt, StreamExt};
 use pcadlang_runs::failure::Failure;
+use serde_json::json;
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::future::Future;
 use std::sync::Arc;
-use tokio::sync::Semaphore;
+use tokio::sync::broadcast::error::RecvError;
+use tokio::sync::{Semaphore, mpsc};
 
 /// The largest photograph, in bytes.
 pub const PHOTOGRAPH: usize = 64 << 20;
@@ -29,21 +33,21 @@ pub const PHOTOGRAPH: usize = 64 << 20;
 const FILE: u64 = 256 << 20;
 /// The largest text frame, in bytes.
 pub const FRAME: usize = 16 << 20;
-/// The most sockets that are open at a time.
+/// Maximum open sockets.
 const SOCKETS: usize = 64;
-/// The most photographs that are received at a time.
+/// Maximum concurrent uploads of photographs.
 const UPLOADS: usize = 4;
 
-/// What the page may load: its own files, and pictures that it made itself.
+/// The content security policy: the page may load its own files and pictures that it made.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; \
      img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
      frame-ancestors 'none'";
 
-/// What all handlers share.
+/// The state that all handlers share.
 #[derive(Clone)]
 pub struct Server {
     /// Does what is asked.
-    pub desk: Arc<Desk>,
+    pub app: Arc<App>,
     guard: Arc<Guard>,
     /// Where the files of the page are, if not in this program.
     page: Option<Arc<std::path::Path>>,
@@ -55,9 +59,9 @@ pub struct Server {
 type Asked = Query<HashMap<String, String>>;
 
 /// Makes the routes of the server.
-pub fn router(desk: Arc<Desk>, guard: Arc<Guard>, page: Option<Arc<std::path::Path>>) -> Router {
+pub fn router(app: Arc<App>, guard: Arc<Guard>, page: Option<Arc<std::path::Path>>) -> Router {
     let server = Server {
-        desk,
+        app,
         guard,
         page,
         sockets: Arc::new(Semaphore::new(SOCKETS)),
@@ -105,7 +109,7 @@ async fn guarded(State(server): State<Server>, request: Request, next: Next) -> 
 }
 
 async fn asset(server: &Server, name: &str) -> Response {
-    match assets::find(name, server.page.as_deref()) {
+    match find(name, server.page.as_deref()) {
         Some((kind, bytes)) => {
             ([(CONTENT_TYPE, kind)], Body::from(Bytes::from_owner(bytes))).into_response()
         }
@@ -133,7 +137,7 @@ const BUSY: Refusal =
 fn opened<F>(
     server: Server,
     upgrade: WebSocketUpgrade,
-    serve: impl FnOnce(WebSocket, Arc<Desk>) -> F + Send + 'static,
+    serve: impl FnOnce(WebSocket, Arc<App>) -> F + Send + 'static,
 ) -> Response
 where
     F: Future<Output = ()> + Send,
@@ -141,17 +145,17 @@ where
     let Ok(place) = server.sockets.try_acquire_owned() else { return refused(BUSY) };
     let upgrade = upgrade.max_message_size(FRAME).max_frame_size(FRAME);
     upgrade.on_upgrade(move |socket| async move {
-        serve(socket, server.desk).await;
+        serve(socket, server.app).await;
         drop(place);
     })
 }
 
 async fn open_socket(State(server): State<Server>, upgrade: WebSocketUpgrade) -> Response {
-    opened(server, upgrade, socket::serve)
+    opened(server, upgrade, serve)
 }
 
 async fn open_language(State(server): State<Server>, upgrade: WebSocketUpgrade) -> Response {
-    opened(server, upgrade, language_socket::serve)
+    opened(server, upgrade, language::serve)
 }
 
 fn problem(status: StatusCode, problem: &Failure) -> Response {
@@ -173,10 +177,10 @@ async fn take_picture(State(server): State<Server>, asked: Asked, request: Reque
         Ok(bytes) => bytes,
         Err(_) => return refused(large),
     };
-    let desk = Arc::clone(&server.desk);
+    let app = Arc::clone(&server.app);
     let stored = tokio::task::spawn_blocking(move || {
-        let file = desk.folder.store_picture(&name, &bytes)?;
-        desk.tell(serde_json::json!({ "event": "folder" }));
+        let file = app.folder.store_picture(&name, &bytes)?;
+        app.tell(serde_json::json!({ "event": "folder" }));
         Ok::<_, Failure>(file)
     });
     match stored.await {
@@ -187,7 +191,7 @@ async fn take_picture(State(server): State<Server>, asked: Asked, request: Reque
 }
 
 async fn send_file(State(server): State<Server>, Path(path): Path<String>) -> Response {
-    let file = match server.desk.folder.file(&path) {
+    let file = match server.app.folder.file(&path) {
         Ok(file) => file,
         Err(e) => return problem(StatusCode::FORBIDDEN, &e),
     };
@@ -212,4 +216,109 @@ async fn send_file(State(server): State<Server>, Path(path): Path<String>) -> Re
         response.headers_mut().insert(CONTENT_DISPOSITION, value);
     }
     response
+}
+
+/// Name, type and contents of each file.
+const ASSETS: [(&str, &str, &[u8]); 4] = [
+    ("index.html", "text/html; charset=utf-8", include_bytes!("../../../web/dist/index.html")),
+    ("studio.js", "text/javascript; charset=utf-8", include_bytes!("../../../web/dist/studio.js")),
+    ("studio.css", "text/css; charset=utf-8", include_bytes!("../../../web/dist/studio.css")),
+    ("licences.txt", "text/plain; charset=utf-8", include_bytes!("../../../web/dist/licences.txt")),
+];
+
+/// Returns the type and the contents of a file of the page. They are read from `folder`
+/// if one is given, for those who work on the page.
+pub fn find(
+    name: &str,
+    folder: Option<&std::path::Path>,
+) -> Option<(&'static str, Cow<'static, [u8]>)> {
+    let (name, kind, bytes) = ASSETS.iter().find(|(n, ..)| *n == name)?;
+    let read = folder.and_then(|f| std::fs::read(f.join(name)).ok());
+    Some((kind, read.map_or(Cow::Borrowed(*bytes), Cow::Owned)))
+}
+
+/// Maximum concurrent requests per page; the rest are queued.
+const AT_ONCE: usize = 8;
+/// Maximum concurrent and queued requests per page; the rest are refused.
+const PENDING: usize = 256;
+/// Maximum frames queued for a slow page.
+const WAITING: usize = 64;
+
+/// Serves a page until it leaves.
+pub async fn serve(socket: WebSocket, app: Arc<App>) {
+    let (mut out, mut from) = socket.split();
+    let (send, mut frames) = mpsc::channel::<Frame>(WAITING);
+    let mut events = app.events.subscribe();
+    let sender = tokio::spawn(async move {
+        loop {
+            let message = tokio::select! {
+                frame = frames.recv() => match frame {
+                    Some(Frame::Text(text)) => Message::Text(text.into()),
+                    Some(Frame::Binary(bytes)) => Message::Binary(bytes),
+                    None => break,
+                },
+                event = events.recv() => match event {
+                    Ok(text) => Message::Text(text.into()),
+                    // A page that is too slow misses some events; the next ones are newer.
+                    Err(RecvError::Lagged(_)) => continue,
+                    Err(RecvError::Closed) => break,
+                },
+            };
+            if out.send(message).await.is_err() {
+                break;
+            }
+        }
+    });
+    let (places, pending) = (Arc::new(Semaphore::new(AT_ONCE)), Arc::new(Semaphore::new(PENDING)));
+    while let Some(Ok(message)) = from.next().await {
+        let request = match &message {
+            Message::Text(text) => protocol::Request::read(text),
+            Message::Binary(_) => Err(protocol::Misunderstood {
+                id: None,
+                message: "requests are text frames".to_owned(),
+                hint: None,
+            }),
+            Message::Close(_) => break,
+            Message::Ping(_) | Message::Pong(_) => continue,
+        };
+        let request = match request {
+            Ok(request) => request,
+            Err(m) => {
+                let said = protocol::error(m.id, &m.message, m.hint.as_deref(), json!([]));
+                if send.send(Frame::Text(said)).await.is_err() {
+                    break;
+                }
+                continue;
+            }
+        };
+        let Ok(held) = Arc::clone(&pending).try_acquire_owned() else {
+            let said = "too many requests are waiting for their answers";
+            let said = protocol::error(Some(request.id), said, None, json!([]));
+            if send.send(Frame::Text(said)).await.is_err() {
+                break;
+            }
+            continue;
+        };
+        let (app, send, places) = (Arc::clone(&app), send.clone(), Arc::clone(&places));
+        // What ends the work of others does not wait for it.
+        let ends = matches!(request.call, Call::Interrupt(_) | Call::Pause(_) | Call::Stop(_));
+        tokio::spawn(async move {
+            let place = match ends {
+                true => None,
+                false => places.acquire_owned().await.ok(),
+            };
+            // What a session or a run does is not asynchronous, and may take long.
+            let done = tokio::task::spawn_blocking(move || {
+                let done = frame(request.id, app.answer(request.call));
+                drop(place);
+                done
+            });
+            if let Ok(done) = done.await {
+                let _ = send.send(done).await;
+            }
+            drop(held);
+        });
+    }
+    drop(send);
+    sender.abort();
 }

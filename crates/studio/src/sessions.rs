@@ -2,7 +2,7 @@
 //! is done in turn.
 
 use super::folder::is_picture;
-use super::layout::finite;
+use super::results::finite;
 use pcadlang_engine::lang::reach::path_within;
 use pcadlang_engine::trace::Stop;
 use pcadlang_library::Program;
@@ -21,7 +21,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The most sessions that are open at a time.
+/// Maximum open sessions.
 const MOST: usize = 64;
 
 /// Something to do with a session.
@@ -49,7 +49,7 @@ pub struct OpenSession {
     pub session: Session,
     /// The command line that gives its program and data.
     pub job: Job,
-    /// What was said when it was opened.
+    /// The message at its opening.
     pub note: String,
     /// The names of its data that are not given.
     missing: Vec<String>,

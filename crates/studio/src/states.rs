@@ -1,6 +1,6 @@
-//! States of runs: which trace a name stands for, and its picture.
+//! States of runs: which trace a name stands for, and its picture. Pictures are cached, and
+//! drawn so rarely that the chains do not slow down.
 
-use super::pictures::Encoded;
 use super::protocol::{StateName, Viewpoint};
 use super::run::{Run, revision};
 use pcadlang_engine::lang::value::Located;
@@ -8,6 +8,7 @@ use pcadlang_engine::trace::{SavedTrace, Trace};
 use pcadlang_inference::{KeptTrace, TrajectoryState};
 use pcadlang_library::scene::ImageValue;
 use pcadlang_report::Mode;
+use pcadlang_runs::drawing_budget::DrawingBudget;
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::inputs::Ready;
 use pcadlang_runs::reopening::film::best_chain;
@@ -16,7 +17,9 @@ use pcadlang_runs::scene;
 use pcadlang_scene::render::{Camera, Projection, View};
 use pcadlang_workbench::session::Layer;
 use serde_json::{Map, Value, json};
-use std::sync::Arc;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 /// The longer side of pictures, in pixels.
 const SIDES: std::ops::RangeInclusive<u32> = 16..=2048;
@@ -118,7 +121,7 @@ impl Run {
             let located = state.trace.located();
             let (mut header, data) =
                 picture(&view, state.ready.image(), &located, layer, size, camera)?;
-            header.insert("log_joint".into(), super::layout::finite(log_joint));
+            header.insert("log_joint".into(), super::results::finite(log_joint));
             header.insert("revision".into(), json!(revision(log_joint)));
             Ok::<_, Failure>((header, Arc::new(data)))
         })?;
@@ -190,4 +193,60 @@ fn seen_from(v: Viewpoint, other: &Camera) -> Result<Camera, Failure> {
     let focal_px = 0.5 * height / (0.5 * v.fov_y.to_radians()).tan();
     let projection = Projection::Pinhole { focal_px, cx: 0.5 * width, cy: 0.5 * height };
     Ok(Camera { eye, right, up: right.cross(forward), forward, projection, ..*other })
+}
+
+/// Maximum cached pictures per run.
+const KEPT: usize = 24;
+
+/// A picture file with its header.
+pub type Encoded = (Map<String, Value>, Arc<Vec<u8>>);
+
+/// The pictures of a run that were drawn last, and when the next one may be drawn.
+#[derive(Default)]
+pub struct Pictures {
+    kept: Mutex<VecDeque<(String, Encoded)>>,
+    turn: Mutex<DrawingBudget>,
+    /// Held while one is drawn, so that many tabs do not draw the same one.
+    drawing: Mutex<()>,
+}
+
+impl Pictures {
+    /// Returns a picture that was drawn before.
+    pub fn get(&self, key: &str) -> Option<Encoded> {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.iter().find(|(k, _)| k == key).map(|(_, e)| e.clone())
+    }
+
+    /// Keeps a picture, in place of the oldest one.
+    pub fn keep(&self, key: String, picture: &Encoded) {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.push_back((key, picture.clone()));
+        while kept.len() > KEPT {
+            kept.pop_front();
+        }
+    }
+
+    /// Waits until nobody else draws this run: many tabs then share one picture.
+    pub fn alone(&self) -> MutexGuard<'_, ()> {
+        self.drawing.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Gives up the memory of all pictures.
+    pub fn forget(&self) {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner).clear();
+    }
+
+    /// Waits until a picture may be drawn beside the chains, draws it, and keeps account
+    /// of what that cost.
+    pub fn in_turn<T>(&self, is_working: bool, draw: impl FnOnce() -> T) -> T {
+        let turn = || self.turn.lock().unwrap_or_else(PoisonError::into_inner);
+        if is_working {
+            let rest = turn().rest();
+            std::thread::sleep(rest);
+        }
+        let begun = Instant::now();
+        let drawn = draw();
+        turn().took(begun.elapsed());
+        drawn
+    }
 }

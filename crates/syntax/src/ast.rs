@@ -124,7 +124,7 @@ pub struct Param {
 }
 
 /// `{ stmt* expr }`: statements, then the expression whose value is that of the body.
-/// Without one, the body has no value.
+/// Without one, the value is missing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// The statements.
@@ -136,7 +136,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// Whether it is an expression alone.
+    /// Returns whether it is an expression alone.
     pub fn is_expression(&self) -> bool {
         self.stmts.is_empty() && self.result.is_some()
     }

@@ -65,14 +65,14 @@ pub enum SyntaxErrorKind {
     TooLarge(usize),
     /// A statement without its semicolon.
     MissingSemicolon {
-        /// Whether the text ends there.
+        /// True if the text ends there.
         at_end: bool,
     },
     /// A token that does not fit the grammar.
     Unexpected {
         /// The token that was found, in words.
         found: String,
-        /// Whether it is the end of the text.
+        /// True if it is the end of the text.
         at_end: bool,
         /// The tokens that were expected, in words.
         expected: String,
@@ -90,11 +90,11 @@ pub enum SyntaxErrorKind {
 /// The wording of an error, if it can be better than "unexpected …, expected …".
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Advice {
-    /// What is wrong.
+    /// The error.
     pub message: Option<String>,
     /// The label at its place.
     pub label: Option<String>,
-    /// What to do instead.
+    /// What to write instead.
     pub hint: Option<String>,
     /// The index of the token to point at, if it is not the one that did not fit.
     pub place: Option<usize>,

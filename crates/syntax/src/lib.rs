@@ -17,6 +17,7 @@ mod build;
 mod deep;
 mod delimiters;
 pub mod diag;
+pub mod elsewhere;
 mod entry;
 mod error;
 mod expected;
@@ -37,7 +38,7 @@ pub use error::{AddressError, MAX_ERRORS, MAX_NESTING, MAX_TOKENS, SyntaxError, 
 pub use format::{WIDTH, format, print, print_expr};
 pub use parse::{parse, parse_expr};
 pub use statements::{Place, STATEMENTS, Statement};
-pub use token::{is_keyword, is_name};
+pub use token::{KEYWORDS, is_keyword, is_name, keywords};
 
 lalrpop_util::lalrpop_mod!(
     #[allow(clippy::all, missing_docs, unused, unreachable_pub)]

@@ -313,6 +313,24 @@ fn number<'s>(lexer: &mut logos::Lexer<'s, Token<'s>>) -> Option<f64> {
     lexer.slice().parse().ok()
 }
 
+/// The keywords by their class in editors. The grammars for TextMate, Pygments and tree-sitter
+/// are tested to have the same.
+pub const KEYWORDS: [(&str, &str); 4] = [
+    ("constant", "true false"),
+    ("operator", "or and not"),
+    ("control", "for in if else warmup repeat every mix stop when collect propose"),
+    (
+        "declaration",
+        "include param data fn kernel infer report export as to assume let observe with \
+         coarse predict factor force freeze forget sample",
+    ),
+];
+
+/// Returns all keywords.
+pub fn keywords() -> impl Iterator<Item = &'static str> {
+    KEYWORDS.iter().flat_map(|(_, words)| words.split(' '))
+}
+
 /// Returns whether a text is a keyword.
 pub fn is_keyword(text: &str) -> bool {
     is_name(text) && !matches!(Token::lexer(text).next(), Some(Ok(Token::Name(_))))
@@ -324,4 +342,21 @@ pub fn is_name(text: &str) -> bool {
     let mut bytes = text.bytes();
     bytes.next().is_some_and(|b| b.is_ascii_alphabetic() || b == b'_')
         && bytes.all(|b| b.is_ascii_alphanumeric() || b == b'_')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_keyword_has_one_class() {
+        let tokens = include_str!("token.rs").split("#[token(\"").skip(1);
+        let mut known: Vec<&str> = tokens.filter_map(|t| t.split('"').next()).collect();
+        known.retain(|t| is_name(t));
+        let mut classed: Vec<&str> = keywords().collect();
+        known.sort_unstable();
+        classed.sort_unstable();
+        assert_eq!(known, classed);
+        assert!(classed.iter().all(|k| is_keyword(k)));
+    }
 }

@@ -17,10 +17,10 @@ pub(crate) struct Tokens<'s> {
     pub end_name: &'static str,
     pub lexemes: Vec<Lexeme<'s>>,
     mates: Vec<usize>,
-    /// Whether a `;` is added before each token; the last entry is for the end of the
+    /// True for each token before which a `;` is added; the last entry is for the end of the
     /// text.
     pub semicolon: Vec<bool>,
-    /// Whether each token is left out, as part of a bad statement.
+    /// True for each token that is left out, as part of a bad statement.
     dropped: Vec<bool>,
     /// The index of the token that the parser requested last.
     last: Cell<usize>,

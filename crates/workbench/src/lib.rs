@@ -1,4 +1,4 @@
-//! What works on programs beside a run: the session of a prompt or a studio, what editors
+//! Work on programs apart from runs: the session of a prompt or a studio, what editors
 //! ask, proposals from banks, trade-offs of settings, scores.
 #![warn(missing_docs)]
 #![forbid(unsafe_code)]
@@ -6,6 +6,7 @@
 
 pub mod bank;
 pub mod editor;
+pub mod failure;
 pub mod lsp;
 pub mod score;
 pub mod session;

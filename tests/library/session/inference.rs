@@ -3,7 +3,7 @@
 use super::{LINE, line, refuses, says, state};
 use pcadlang::Program;
 use pcadlang_engine::trace::Stop;
-use pcadlang_workbench::session::{Session, Trouble};
+use pcadlang_workbench::session::{Failure, Session};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -128,7 +128,7 @@ fn what_is_stopped_changes_nothing_but_inference_keeps_its_draws() {
         let done = s.enter(text);
         ends.join().unwrap();
         stop.store(false, Ordering::SeqCst);
-        assert!(matches!(done, Err(Trouble::Stopped)), "{text}: {done:?}");
+        assert!(matches!(done, Err(Failure::Interrupted)), "{text}: {done:?}");
     };
     interrupted(&mut s, "let endless = fold(fn(a, i) { a + i }, 0, 0 .. 10000000)");
     assert_eq!(state(&s), before);

@@ -37,7 +37,7 @@ fn says(s: &mut Session, text: &str) -> String {
 fn refuses(s: &mut Session, text: &str) -> String {
     match s.enter(text) {
         Ok(reply) => panic!("{text}: {}", reply.text),
-        Err(e) => e.to_string(),
+        Err(e) => e.with_hint(),
     }
 }
 

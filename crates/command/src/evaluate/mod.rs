@@ -11,9 +11,7 @@ use super::args::{Evaluate, Inputs, Job};
 use dataset::Case;
 pub use dataset::{Dataset, Layout, known};
 pub use observed::{Detections, Items, observations_for};
-use pcadlang_report::evaluation::{
-    EvaluationDir, MARK, PREDICTIONS, Row, TABLE, markdown, prediction,
-};
+use pcadlang_report::evaluation::{MARK, PREDICTIONS, Row, TABLE, markdown, open, prediction};
 use pcadlang_report::{RunDir, bytes_hash, r_hat_text, seconds};
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::job::{CHECKPOINT, Interrupt, RunMode};
@@ -28,7 +26,7 @@ struct Task {
     case: Case,
     job: Job,
     record: Map<String, Value>,
-    /// Whether the case is selected by `--only`, or by default.
+    /// True if the case is selected by `--only`, or by default.
     chosen: bool,
     /// The result so far; `None` for a case that is neither selected nor done.
     row: Option<Row>,
@@ -38,7 +36,7 @@ struct Task {
 struct Evaluation<'a> {
     a: &'a Evaluate,
     layout: Layout,
-    dir: EvaluationDir,
+    dir: RunDir,
     tasks: Vec<Task>,
     /// The fields of `evaluation.json` before `cases`.
     head: Map<String, Value>,
@@ -112,7 +110,7 @@ impl<'a> Evaluation<'a> {
         let detections = a.keypoints.clone().map(Detections::open).transpose()?;
         let items = Items::of(&program, detections.is_some())?;
         program.without_data().compile()?;
-        let dir = EvaluationDir::open(&a.out).map_err(|e| plain(e.to_string()))?;
+        let dir = open(&a.out).map_err(|e| plain(e.to_string()))?;
         let edges = inputs::detector_bytes(a.inputs.edges.as_deref())?;
         let mut said = None;
         let task = |case: Case| {

@@ -1,6 +1,6 @@
 //! `run --explain`: what was modelled, proposed, redrawn and skipped, and why.
 //!
-//! What one proposal draws is measured: a choice of each group is proposed in the last
+//! The cost of a proposal is measured: a choice of each group is proposed in the last
 //! state of the first chain, and the proposal is then undone.
 
 use pcadlang_engine::trace::{Draws, Target, Trace};

@@ -24,7 +24,7 @@ pub struct Lines {
     history: Option<PathBuf>,
 }
 
-/// What the user typed.
+/// An entry of the user.
 pub enum Typed {
     /// A complete entry, of one or more lines.
     Entry(String),

@@ -1,25 +1,19 @@
 //! `pcadlang repl`: a session at a prompt, or a piped script.
 
-mod blocks;
 mod edit;
 mod editor;
-mod iterm;
-mod kitty;
 mod pictures;
-mod sixel;
-#[cfg(test)]
-mod testing;
 
 use super::args::{Graphics, Inputs, Job, Repl, Sampling};
 use editor::{Lines, Typed, is_whole};
 use pcadlang_engine::trace::Stop;
 use pcadlang_report::number;
-use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::failure::{Failure, STOPPED, plain};
 use pcadlang_runs::inputs;
 use pcadlang_runs::reopening::reopened::Reopened;
 use pcadlang_runs::term;
 use pcadlang_runs::term::has_colors;
-use pcadlang_workbench::session::{Reply, Request, Session, Status, Trouble};
+use pcadlang_workbench::session::{Reply, Request, Session, Status};
 use std::cell::{Cell, RefCell};
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::Path;
@@ -101,7 +95,7 @@ struct Front {
     graphics: Graphics,
     /// An edited program with errors, from which the next `:edit` starts.
     draft: Option<String>,
-    /// Whether a progress line is shown on the terminal.
+    /// True if a progress line is shown on the terminal.
     shown: Rc<Cell<bool>>,
     interrupts: Arc<Interrupts>,
 }
@@ -142,7 +136,7 @@ impl Front {
                 Typed::Entry(text) => match self.answered(&text, &mut lines) {
                     Ok(leaves) => leaves,
                     Err(Failure::Interrupted) => {
-                        error_line!("{}", Trouble::Stopped);
+                        error_line!("{STOPPED}");
                         false
                     }
                     Err(failure) => {
@@ -182,9 +176,8 @@ impl Front {
             match done {
                 Ok(true) => return Ok(()),
                 Ok(false) => {}
-                Err(Failure::Plain(message, hint)) if transcript => {
-                    print(&Trouble::Plain(message, hint).to_string());
-                    print_line!("");
+                Err(failure @ Failure::Plain(..)) if transcript => {
+                    print(&(failure.with_hint() + "\n"));
                 }
                 Err(Failure::Program(e)) if transcript => print(&e.to_string()),
                 Err(failure) => return Err(failure),

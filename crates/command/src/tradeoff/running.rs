@@ -101,16 +101,8 @@ mod tests {
 
     #[test]
     fn two_chains_are_as_one() {
-        let row = |x: f64| DrawRow {
-            chain: 0,
-            draw: 0,
-            step: 0,
-            log_joint: 0.0,
-            log_prior: 0.0,
-            log_likelihood: 0.0,
-            values: vec![x, x * x, -x],
-            ..DrawRow::default()
-        };
+        let row =
+            |x: f64| DrawRow { log_joint: 0.0, values: vec![x, x * x, -x], ..DrawRow::default() };
         let mut chains = [Running::default(), Running::default()];
         for c in &mut chains {
             c.columns(&[Column::scalar("a"), Column::vector("v", 2)]).unwrap();

@@ -22,36 +22,36 @@ pub(super) struct Entry<'a> {
     pub output: usize,
 }
 
-type Fit<T> = Result<T, Unfit>;
+type Checked<T> = Result<T, Rejection>;
 
 /// The reason why an operator is rejected.
-pub(super) enum Unfit {
+pub(super) enum Rejection {
     File(NetworkError),
     Operator(String),
 }
 
-impl From<NetworkError> for Unfit {
+impl From<NetworkError> for Rejection {
     fn from(e: NetworkError) -> Self {
-        Unfit::File(e)
+        Rejection::File(e)
     }
 }
 
-impl From<&str> for Unfit {
+impl From<&str> for Rejection {
     fn from(why: &str) -> Self {
-        Unfit::Operator(why.into())
+        Rejection::Operator(why.into())
     }
 }
 
 impl<'a> Entry<'a> {
-    fn byte(&self, i: usize) -> Fit<u8> {
+    fn byte(&self, i: usize) -> Checked<u8> {
         Ok(self.options.map_or(Ok(0), |o| o.u8(i))?)
     }
 
-    fn number(&self, i: usize, default: i32) -> Fit<i32> {
+    fn number(&self, i: usize, default: i32) -> Checked<i32> {
         Ok(self.options.map_or(Ok(default), |o| o.i32(i, default))?)
     }
 
-    fn size(&self, i: usize, default: i32) -> Fit<usize> {
+    fn size(&self, i: usize, default: i32) -> Checked<usize> {
         match usize::try_from(self.number(i, default)?) {
             Ok(n @ 1..=LONGEST) => Ok(n),
             _ => Err("a window or stride has an invalid size".into()),
@@ -60,7 +60,7 @@ impl<'a> Entry<'a> {
 
     /// Returns a window of this size. The options start with the padding, then the
     /// strides along columns and rows.
-    fn window(&self, size: [usize; 2]) -> Fit<Window> {
+    fn window(&self, size: [usize; 2]) -> Checked<Window> {
         if size.iter().any(|s| !(1..=LONGEST).contains(s)) {
             return Err("a window has an invalid size".into());
         }
@@ -72,7 +72,7 @@ impl<'a> Entry<'a> {
         Ok(Window { size, stride: [self.size(2, 1)?, self.size(1, 1)?], same })
     }
 
-    fn clip(&self, i: usize) -> Fit<Clip> {
+    fn clip(&self, i: usize) -> Checked<Clip> {
         match self.byte(i)? {
             0 => Ok(Clip { lo: f32::NEG_INFINITY, hi: f32::INFINITY }),
             1 => Ok(Clip { lo: 0.0, hi: f32::INFINITY }),
@@ -84,14 +84,18 @@ impl<'a> Entry<'a> {
 
 impl File<'_> {
     /// Returns the operator of an entry, and the inputs that it reads when it runs.
-    pub fn operator(&mut self, e: &Entry) -> Fit<(Operator, Vec<usize>)> {
+    pub fn operator(&mut self, e: &Entry) -> Checked<(Operator, Vec<usize>)> {
         let first = *e.inputs.first().ok_or("it has no input")?;
         let (input, output) = (self.shapes[first].clone(), self.shapes[e.output].clone());
         let pictures =
             || Size::of(&input).zip(Size::of(&output)).ok_or("its tensors are not single images");
         let one = |operator: Operator| Ok((operator, vec![first]));
         let fits = |holds: bool| {
-            if holds { Ok(()) } else { Err(Unfit::from("the shapes of its tensors do not match")) }
+            if holds {
+                Ok(())
+            } else {
+                Err(Rejection::from("the shapes of its tensors do not match"))
+            }
         };
         match e.code {
             code::CONVOLUTION | code::DEPTHWISE => {
@@ -259,7 +263,7 @@ impl File<'_> {
     }
 
     /// Returns the third input, with a number for each channel; zeros if it is missing.
-    fn biases(&mut self, e: &Entry, channels: usize) -> Fit<Vec<f32>> {
+    fn biases(&mut self, e: &Entry, channels: usize) -> Checked<Vec<f32>> {
         let Some(t) = e.inputs.get(2) else { return Ok(vec![0.0; channels]) };
         let biases = self.numbers(*t)?;
         if biases.len() == channels {

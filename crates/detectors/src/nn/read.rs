@@ -2,7 +2,7 @@
 //! and checks that they fit together.
 
 use super::NetworkError;
-use super::assemble::{Entry, Unfit};
+use super::assemble::{Entry, Rejection};
 use super::file::{File, format};
 use super::flatbuffer::Table;
 use super::network::{Layer, Network};
@@ -51,8 +51,8 @@ impl Network {
                 continue;
             }
             let (operator, inputs) = file.operator(&entry).map_err(|e| match e {
-                Unfit::File(e) => e,
-                Unfit::Operator(why) => wrong(&why),
+                Rejection::File(e) => e,
+                Rejection::Operator(why) => wrong(&why),
             })?;
             for t in inputs.iter().filter(|t| !filled.contains(t)) {
                 if !constants.contains_key(t) {

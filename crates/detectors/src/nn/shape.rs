@@ -40,8 +40,8 @@ pub(super) struct Window {
     /// Rows and columns of the window, and of the stride.
     pub size: [usize; 2],
     pub stride: [usize; 2],
-    /// Whether the image is padded so that there is a window for each stride (`SAME`), or
-    /// not padded (`VALID`).
+    /// True if the image is padded so that there is a window for each stride (`SAME`), false if
+    /// it is not padded (`VALID`).
     pub same: bool,
 }
 

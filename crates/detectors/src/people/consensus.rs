@@ -60,7 +60,7 @@ pub(super) fn prominence(runs: &[Run], width: u32, height: u32) -> f64 {
     seen * side / f64::from(width.max(height)) * libm::exp(-2.0 * off)
 }
 
-/// What the views of a person agree on.
+/// The detection on which the views of a person agree.
 #[derive(Clone, Debug)]
 pub(super) struct Consensus {
     pub landmarks: [Landmark; NAMED],

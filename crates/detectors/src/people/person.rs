@@ -1,4 +1,4 @@
-//! What is found of a person: landmarks and a mask.
+//! A detected person: landmarks and a mask.
 
 use super::landmarks::{NAMED, SIDE};
 use super::window::Window;

@@ -13,7 +13,7 @@ pub struct Window {
     pub side: f64,
     /// Its clockwise rotation, in radians.
     pub turn: f64,
-    /// Whether left and right are exchanged in it.
+    /// True if left and right are exchanged in it.
     pub mirrored: bool,
 }
 
@@ -63,7 +63,7 @@ impl Window {
         [if self.mirrored { -u } else { u } + 0.5, v + 0.5]
     }
 
-    /// Whether a window can be sampled: its numbers are finite and its size is
+    /// Returns whether a window can be sampled: its numbers are finite and its size is
     /// reasonable.
     pub(super) fn is_sound(&self) -> bool {
         let all = [self.centre[0], self.centre[1], self.turn, self.side];

@@ -21,7 +21,7 @@ pub enum FaultKind {
     Cycle,
     /// Two draws at one address.
     Duplicate,
-    /// The use of an entry of a table that has no value.
+    /// The use of a missing entry of a table.
     Missing,
     /// A file that cannot be read, and anything else.
     Other,

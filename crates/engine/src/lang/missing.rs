@@ -18,11 +18,11 @@ pub struct Missing {
     pub at: (usize, usize),
     /// What is written there.
     pub text: Box<str>,
-    /// Why it has no value.
+    /// Why it is missing.
     pub why: Why,
 }
 
-/// Why an entry has no value.
+/// Why an entry is missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Why {
     /// It is left out.

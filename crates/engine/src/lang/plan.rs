@@ -327,7 +327,7 @@ pub enum Given {
     Steps,
     /// `elapsed()`
     Elapsed,
-    /// A built-in that has no value here.
+    /// A built-in that is undefined here.
     Unavailable(Arc<str>, Span),
 }
 

@@ -122,7 +122,7 @@ fn read(quantities: &Quantities, trace: &mut Trace) -> Vec<f64> {
     row
 }
 
-/// Reads the state at every draw of a chain, and then redraws the data.
+/// Reads the state at every draw of a chain, and then simulates new data.
 #[derive(Debug)]
 struct Turns {
     code: Arc<Code>,

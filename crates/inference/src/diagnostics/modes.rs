@@ -87,7 +87,7 @@ mod tests {
         // A single short chain is enough for the comparison to be uninformative.
         let uneven = vec![vec![1.0, 2.0], vec![9.0; 60]];
         assert_eq!(modes(&[&uneven]), [vec![0, 1]]);
-        // A chain that never started says nothing about the others.
+        // A chain that never started is ignored.
         let missing = vec![vec![1.0; 60], vec![], vec![2.0; 60], vec![1.0; 60]];
         assert_eq!(modes(&[&missing]), [vec![0, 3], vec![2]]);
     }

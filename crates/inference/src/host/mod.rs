@@ -71,7 +71,7 @@ impl Host {
     ///
     /// # Errors
     /// A name that is none or taken, arguments that cannot be told apart, a gradient of
-    /// what is no function: all of them.
+    /// what is not a function: all of them.
     #[doc(hidden)]
     pub fn table(&self, own: &Table) -> Result<Arc<Table>, Error> {
         let mut diagnostics = Vec::new();

@@ -101,9 +101,4 @@ impl Checkpoint {
     pub fn steps(&self) -> u64 {
         self.step
     }
-
-    /// Whether the plan is finished.
-    pub fn is_finished(&self) -> bool {
-        self.finished
-    }
 }

@@ -430,7 +430,7 @@ impl<'a> Runner<'a> {
             || self.options.callback.as_ref().is_some_and(|w| w.is_over())
     }
 
-    /// Waits while the run is paused. The chain's clock stands still meanwhile.
+    /// Waits while the run is paused. The chain's clock is stopped meanwhile.
     pub fn pause(&mut self) {
         let waited = self.progress.pause.wait(|| self.is_cancelled());
         self.started = self.started.checked_add(waited).unwrap_or(self.started);

@@ -7,58 +7,39 @@ use super::*;
 use crate::num::{Column, ExactSum};
 use std::fmt;
 
+/// Numbers in a column, and the columns of their distributions' parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct Rows<'a> {
+    /// The numbers.
+    pub x: Column,
+    /// The parameters, in the order of the constructor.
+    pub params: &'a [Column],
+    /// The number of numbers.
+    pub n: usize,
+}
+
 /// Numbers under distributions of one family. Columns of parameters are in the order of
 /// the constructor; without columns, the parameters stay as they were when the batch was
 /// made.
 pub trait Batch: fmt::Debug + Send + Sync {
     /// Adds the log densities of `n` numbers to a sum. Returns false, with part of them
     /// added, if a number is NaN or a parameter is outside its domain.
-    fn score(
-        &mut self,
-        buffer: &[f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        sum: &mut ExactSum,
-    ) -> bool;
+    fn score(&mut self, buffer: &[f64], rows: Rows, sum: &mut ExactSum) -> bool;
 
     /// Appends the log densities of the numbers of the last `score`, one by one.
-    fn each(&self, buffer: &[f64], x: Column, n: usize, out: &mut Vec<f64>);
+    fn each(&self, buffer: &[f64], rows: Rows, out: &mut Vec<f64>);
 
     /// Adds `weight` times the derivatives of the log densities of the last `score` to
     /// the adjoints, which are laid out like the buffer.
-    fn vjp(
-        &self,
-        buffer: &[f64],
-        by: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        weight: f64,
-    );
+    fn vjp(&self, buffer: &[f64], by: &mut [f64], rows: Rows, weight: f64);
 
     /// Writes the log densities of `n` numbers to the buffer, from `out` on. Returns false
     /// if a number is NaN or a parameter is outside its domain.
-    fn score_each(
-        &mut self,
-        buffer: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
-    ) -> bool;
+    fn score_each(&mut self, buffer: &mut [f64], rows: Rows, out: usize) -> bool;
 
     /// Adds the derivatives of the log densities of the last `score_each` to the
     /// adjoints, each times the adjoint of its log density.
-    fn vjp_each(
-        &self,
-        buffer: &[f64],
-        by: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
-    );
+    fn vjp_each(&self, buffer: &[f64], by: &mut [f64], rows: Rows, out: usize);
 }
 
 /// A batch of one family that also gives the density and derivatives of its first
@@ -168,9 +149,9 @@ impl<T: Member<N>, const N: usize> Component for Members<T, N> {
 
 impl<T: Member<N>, const N: usize> Members<T, N> {
     /// Returns each number with its distribution.
-    fn numbers(&self, buffer: &[f64], x: Column, n: usize) -> impl Iterator<Item = (f64, &T)> {
+    fn numbers(&self, buffer: &[f64], rows: Rows) -> impl Iterator<Item = (f64, &T)> {
         let each = usize::from(self.0.len() != 1);
-        (0..n).map(move |i| (x.get(buffer, i), &self.0[i * each].1))
+        (0..rows.n).map(move |i| (rows.x.get(buffer, i), &self.0[i * each].1))
     }
 
     /// Adds the derivatives of the log densities, times `all`, and times the adjoint of
@@ -179,13 +160,13 @@ impl<T: Member<N>, const N: usize> Members<T, N> {
         &self,
         buffer: &[f64],
         by: &mut [f64],
-        (x, params, n): (Column, &[Column], usize),
+        rows: Rows,
         weights: Option<usize>,
         all: f64,
     ) {
-        let columns = <&[Column; N]>::try_from(params).ok();
+        let (x, columns) = (rows.x, <&[Column; N]>::try_from(rows.params).ok());
         let (mut of_x, mut of_params) = (0.0, [0.0; N]);
-        for (i, (at, d)) in self.numbers(buffer, x, n).enumerate() {
+        for (i, (at, d)) in self.numbers(buffer, rows).enumerate() {
             let weight = weights.map_or(1.0, |from| by[from + i]);
             // An infinite slope does not matter there.
             if weight == 0.0 {
@@ -213,72 +194,42 @@ impl<T: Member<N>, const N: usize> Members<T, N> {
 }
 
 impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
-    fn score(
-        &mut self,
-        buffer: &[f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        sum: &mut ExactSum,
-    ) -> bool {
-        if !self.refresh(buffer, params) {
+    fn score(&mut self, buffer: &[f64], rows: Rows, sum: &mut ExactSum) -> bool {
+        if !self.refresh(buffer, rows.params) {
             return false;
         }
         let mut there = true;
-        sum.add_each(self.numbers(buffer, x, n).map(|(x, d)| {
+        sum.add_each(self.numbers(buffer, rows).map(|(x, d)| {
             there &= !x.is_nan();
             d.log_density(x)
         }));
         there
     }
 
-    fn each(&self, buffer: &[f64], x: Column, n: usize, out: &mut Vec<f64>) {
-        out.extend(self.numbers(buffer, x, n).map(|(x, d)| d.log_density(x)));
+    fn each(&self, buffer: &[f64], rows: Rows, out: &mut Vec<f64>) {
+        out.extend(self.numbers(buffer, rows).map(|(x, d)| d.log_density(x)));
     }
 
-    fn vjp(
-        &self,
-        buffer: &[f64],
-        by: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        weight: f64,
-    ) {
-        self.add_slopes(buffer, by, (x, params, n), None, weight);
+    fn vjp(&self, buffer: &[f64], by: &mut [f64], rows: Rows, weight: f64) {
+        self.add_slopes(buffer, by, rows, None, weight);
     }
 
-    fn score_each(
-        &mut self,
-        buffer: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
-    ) -> bool {
-        if !self.refresh(buffer, params) {
+    fn score_each(&mut self, buffer: &mut [f64], rows: Rows, out: usize) -> bool {
+        if !self.refresh(buffer, rows.params) {
             return false;
         }
         // What is read is before what is written.
         let (before, out) = buffer.split_at_mut(out);
         let mut there = true;
-        for (out, (x, d)) in out.iter_mut().zip(self.numbers(before, x, n)) {
+        for (out, (x, d)) in out.iter_mut().zip(self.numbers(before, rows)) {
             there &= !x.is_nan();
             *out = d.log_density(x);
         }
         there
     }
 
-    fn vjp_each(
-        &self,
-        buffer: &[f64],
-        by: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
-    ) {
-        self.add_slopes(buffer, by, (x, params, n), Some(out), 1.0);
+    fn vjp_each(&self, buffer: &[f64], by: &mut [f64], rows: Rows, out: usize) {
+        self.add_slopes(buffer, by, rows, Some(out), 1.0);
     }
 }
 

@@ -1,4 +1,4 @@
-//! What the table of families is made of, and the macro that turns its rows into the
+//! The rows of the table of families, and the macro that turns its rows into the
 //! type of all distributions, their constructors and their documentation.
 
 use super::{Datum, Dist, Distribution, ParamError};
@@ -23,7 +23,7 @@ pub enum ParamKind {
 pub struct ParamDoc {
     /// The name in the language.
     pub name: &'static str,
-    /// What it takes.
+    /// The kind of values.
     pub kind: ParamKind,
     /// A description in one sentence.
     pub doc: &'static str,
@@ -33,7 +33,7 @@ pub struct ParamDoc {
     pub unit: &'static str,
 }
 
-/// What a draw from a family is.
+/// The kind of value that a draw from a family is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drawn {
     /// A number, or an array if a parameter is one.
@@ -62,9 +62,9 @@ pub struct Family {
     pub support: &'static str,
     /// The density or probability.
     pub formula: &'static str,
-    /// What a draw is.
+    /// The kind of value that a draw is.
     pub drawn: Drawn,
-    /// What numbers as parameters give, if all parameters are numbers.
+    /// The family as functions of numbers, if all parameters are numbers.
     pub numbers: Option<Numbers>,
 }
 

@@ -4,7 +4,7 @@
 use super::batch::{component, parts};
 use super::continuous::log_norm;
 use super::draw::standard;
-use super::{Batch, Dist, Normal};
+use super::{Batch, Dist, Normal, Rows};
 use crate::num::simd::{sum_of_triples, vectorised_if_many};
 use crate::num::{Column, ExactSum};
 
@@ -39,7 +39,7 @@ impl Normals {
         let known = |x: f64| if width == 0 { x } else { f64::NAN };
         Some(Normals {
             mean: all.iter().map(|d| d.location()).collect(),
-            // NaN is no standard deviation, so the first one differs.
+            // NaN is not a standard deviation, so the first one differs.
             sd: all.iter().map(|d| known(d.scale())).collect(),
             log_norm: all.iter().map(|d| d.log_norm()).collect(),
             z: Vec::new(),
@@ -117,20 +117,20 @@ impl Normals {
 
     /// Computes the log densities. False if a number is NaN or a parameter is outside its
     /// domain.
-    fn compute(&mut self, buffer: &[f64], x: Column, params: &[Column], n: usize) -> bool {
+    fn compute(&mut self, buffer: &[f64], rows: Rows) -> bool {
         vectorised_if_many(
-            n,
+            rows.n,
             #[inline(always)]
-            || self.compute_here(buffer, x, params, n),
+            || self.compute_here(buffer, rows),
         )
     }
 
     #[inline(always)]
-    fn compute_here(&mut self, buffer: &[f64], x: Column, params: &[Column], n: usize) -> bool {
-        if !self.refresh(buffer, params) || !self.standardise(buffer, x, n) {
+    fn compute_here(&mut self, buffer: &[f64], rows: Rows) -> bool {
+        if !self.refresh(buffer, rows.params) || !self.standardise(buffer, rows.x, rows.n) {
             return false;
         }
-        self.terms.resize(n, 0.0);
+        self.terms.resize(rows.n, 0.0);
         let term = |z: f64, log_norm: f64| {
             let score = log_norm - 0.5 * z * z;
             if z.is_nan() { f64::NEG_INFINITY } else { score }
@@ -193,7 +193,7 @@ impl Normals {
     fn add_slopes(
         &self,
         by: &mut [f64],
-        (x, params): (Column, &[Column]),
+        rows: Rows,
         weights: (&[f64], impl Fn(f64) -> f64 + Copy),
         all: f64,
     ) {
@@ -201,10 +201,10 @@ impl Normals {
             self.z.len(),
             #[inline(always)]
             || {
-                if x.live {
-                    self.add(by, &x, weights, all, |z| -z);
+                if rows.x.live {
+                    self.add(by, &rows.x, weights, all, |z| -z);
                 }
-                if let [mean, sd] = params {
+                if let [mean, sd] = rows.params {
                     if mean.live {
                         self.add(by, mean, weights, all, |z| z);
                     }
@@ -218,56 +218,34 @@ impl Normals {
 }
 
 impl Batch for Normals {
-    fn score(
-        &mut self,
-        buffer: &[f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        sum: &mut ExactSum,
-    ) -> bool {
-        let there = self.compute(buffer, x, params, n);
+    fn score(&mut self, buffer: &[f64], rows: Rows, sum: &mut ExactSum) -> bool {
+        let there = self.compute(buffer, rows);
         if there {
             sum.add_all(&self.terms);
         }
         there
     }
 
-    fn each(&self, _: &[f64], _: Column, _: usize, out: &mut Vec<f64>) {
+    fn each(&self, _: &[f64], _: Rows, out: &mut Vec<f64>) {
         out.extend_from_slice(&self.terms);
     }
 
-    fn vjp(&self, _: &[f64], by: &mut [f64], x: Column, params: &[Column], _: usize, weight: f64) {
-        self.add_slopes(by, (x, params), (&self.z, |_| 1.0), weight);
+    fn vjp(&self, _: &[f64], by: &mut [f64], rows: Rows, weight: f64) {
+        self.add_slopes(by, rows, (&self.z, |_| 1.0), weight);
     }
 
-    fn score_each(
-        &mut self,
-        buffer: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
-    ) -> bool {
-        let there = self.compute(buffer, x, params, n);
+    fn score_each(&mut self, buffer: &mut [f64], rows: Rows, out: usize) -> bool {
+        let there = self.compute(buffer, rows);
         if there {
-            buffer[out..out + n].copy_from_slice(&self.terms);
+            buffer[out..out + rows.n].copy_from_slice(&self.terms);
         }
         there
     }
 
-    fn vjp_each(
-        &self,
-        _: &[f64],
-        by: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
-    ) {
+    fn vjp_each(&self, _: &[f64], by: &mut [f64], rows: Rows, out: usize) {
         // What is read is before what is written.
         let (by, weights) = by.split_at_mut(out);
-        self.add_slopes(by, (x, params), (&weights[..n], |w| w), 1.0);
+        self.add_slopes(by, rows, (&weights[..rows.n], |w| w), 1.0);
     }
 }
 
@@ -296,15 +274,16 @@ mod tests {
         for steps in 0..8 {
             let step = |bit: usize| (steps >> bit) & 1;
             let (x, params) = (column(0, step(0)), [column(n, step(1)), column(2 * n, step(2))]);
+            let rows = Rows { x, params: &params, n };
             let parts = vec![one.clone(); if step(1) + step(2) == 0 { 1 } else { n }];
             let mut normals = Normals::new(&parts, 2).unwrap();
             let mut plain = super::super::families::component(&parts, 2).unwrap();
             let score = |batch: &mut dyn Batch| {
                 let mut own = buffer.clone();
-                assert!(batch.score_each(&mut own, x, &params, n, 3 * n));
+                assert!(batch.score_each(&mut own, rows, 3 * n));
                 let mut by = vec![0.0; 3 * n];
                 by.extend(&weights);
-                batch.vjp_each(&own, &mut by, x, &params, n, 3 * n);
+                batch.vjp_each(&own, &mut by, rows, 3 * n);
                 by.truncate(3 * n);
                 (own, by)
             };
@@ -328,7 +307,7 @@ mod tests {
                 let mut own = buffer.clone();
                 own[at] = bad;
                 for batch in [&mut normals as &mut dyn Batch, &mut *plain] {
-                    assert_eq!(batch.score_each(&mut own, x, &params, n, 3 * n), !read, "{at}");
+                    assert_eq!(batch.score_each(&mut own, rows, 3 * n), !read, "{at}");
                 }
             }
         }

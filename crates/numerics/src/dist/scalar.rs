@@ -31,7 +31,7 @@ impl Slope {
 
 /// A distribution of one number.
 pub trait Scalar: Named + fmt::Debug + Send + Sync {
-    /// Whether it is not normalised, see [`Distribution::is_improper`].
+    /// True if it is not normalised, see [`Distribution::is_improper`].
     const IMPROPER: bool = false;
 
     /// The space of the values, if it is the same for all parameters.

@@ -7,7 +7,7 @@ pub struct Column {
     pub at: usize,
     /// The stride: 1, or 0 for a repeated number.
     pub step: usize,
-    /// Whether derivatives with respect to the numbers are needed.
+    /// True if derivatives with respect to the numbers are needed.
     pub live: bool,
 }
 

@@ -123,7 +123,7 @@ impl ExactSum {
         if x.abs() < LARGE { self.fine -= quantised(x) } else { self.put(x, -1) }
     }
 
-    /// Whether all terms were finite and small.
+    /// Returns whether all terms were finite and small.
     #[inline]
     pub fn is_fine(&self) -> bool {
         self.coarse.is_none() && (self.negative | self.positive | self.nan) == 0

@@ -5,7 +5,7 @@
 mod running {
     pub use std::time::Instant;
 
-    /// Whether time passes.
+    /// True if the clock runs.
     pub const RUNS: bool = true;
 }
 
@@ -35,7 +35,7 @@ mod running {
         }
     }
 
-    /// Whether time passes.
+    /// True if the clock runs.
     pub const RUNS: bool = false;
 }
 

@@ -13,19 +13,13 @@
 //! Invariant: the file is readable at any moment, because every line is passed to the
 //! system in one call and the reader leaves out an incomplete last line.
 
-mod lines;
-mod names;
 mod read;
-mod stream;
 mod write;
 
-pub use lines::CsvError;
-pub(crate) use names::as_written;
-pub use names::column_names;
 pub(crate) use read::Contents;
-pub use read::read;
-pub use stream::DrawReader;
-pub use write::CsvSink;
+pub use read::{CsvError, DrawReader, read};
+pub(crate) use write::as_written;
+pub use write::{CsvSink, column_names};
 
 /// The columns about the draw itself, which come first.
 pub(crate) const DRAW_COLUMNS: [&str; 6] =

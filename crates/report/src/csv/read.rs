@@ -1,13 +1,13 @@
-//! Reads a chain's draws, also while they are still being written: an incomplete last
-//! line is left out.
+//! Reads draws from CSV: line by line, draw by draw, or a whole file.
 
-use super::lines::{CsvError, Line, Lines};
-use super::stream::DrawReader;
+use super::DRAW_COLUMNS;
+use super::write::columns;
 use crate::ChainDraws;
-use pcadlang_inference::draws::{Column, DrawRow, merged};
-use std::io::BufRead;
+use pcadlang_inference::draws::{Column, DrawRow, Layout, merged, width};
+use std::io::{self, BufRead, Take};
+use thiserror::Error;
 
-/// What a file of draws has beside its numbers.
+/// The contents of a file of draws, apart from its numbers.
 #[derive(Default)]
 pub(crate) struct Contents {
     /// The lines of comments.
@@ -64,6 +64,198 @@ pub fn read(text: &str) -> Result<ChainDraws, CsvError> {
     Ok(ChainDraws { comments, columns, rows, ..ChainDraws::default() })
 }
 
+/// An error in a file of draws. Lines are counted from 1.
+#[derive(Debug, Error)]
+pub enum CsvError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// The line of names does not start with the columns about the draw.
+    #[error(
+        "line {line}: not a file of draws by pcadlang: its columns do not start with lp__, accept_stat__, …"
+    )]
+    Columns {
+        /// The line.
+        line: usize,
+    },
+    /// A line has too few or too many numbers.
+    #[error("line {line}: {found} numbers, but {expected} columns")]
+    Width {
+        /// The line.
+        line: usize,
+        /// The number of numbers in the line.
+        found: usize,
+        /// The expected number.
+        expected: usize,
+    },
+    /// Something that is not a number.
+    #[error("line {line}: `{text}` is not a number")]
+    Number {
+        /// The line.
+        line: usize,
+        /// The text found.
+        text: String,
+    },
+}
+
+impl CsvError {
+    /// Converts the error for callers that have errors of reading and writing only.
+    pub(crate) fn into_io(self) -> io::Error {
+        match self {
+            CsvError::Io(e) => e,
+            other => io::Error::other(other),
+        }
+    }
+}
+
+/// A complete line of a file of draws.
+pub(super) enum Line<'a> {
+    /// A comment, without its `#`.
+    Comment(&'a str),
+    /// The recorded columns, from a line of names.
+    Names(Vec<Column>),
+    /// A draw.
+    Draw(Numbers<'a>),
+}
+
+/// The text of a draw, and how many recorded numbers it must have.
+pub(super) struct Numbers<'a> {
+    text: &'a str,
+    line: usize,
+    pub width: usize,
+}
+
+/// Reads the complete lines in the first bytes of a file.
+pub(super) struct Lines<R> {
+    from: Take<R>,
+    text: String,
+    /// The length of the lines read so far, in bytes.
+    pub position: u64,
+    /// The number of the lines read so far.
+    pub count: usize,
+    /// The number of recorded numbers after the last line of names.
+    width: Option<usize>,
+}
+
+impl<R: BufRead> Lines<R> {
+    /// Creates a reader; nothing at or after byte `end` is read.
+    pub fn new(from: R, end: u64) -> Self {
+        Lines { from: from.take(end), text: String::new(), position: 0, count: 0, width: None }
+    }
+
+    /// Reads the next line; returns `None` at the end or at an incomplete line.
+    pub fn next_line(&mut self) -> Result<Option<Line<'_>>, CsvError> {
+        self.text.clear();
+        let length = self.from.read_line(&mut self.text)?;
+        let Some(text) = self.text.strip_suffix('\n') else { return Ok(None) };
+        self.position += length as u64;
+        self.count += 1;
+        let (text, line) = (text.trim_end_matches('\r'), self.count);
+        Ok(Some(if let Some(comment) = text.strip_prefix('#') {
+            Line::Comment(comment)
+        } else if let Some(columns) = named(text) {
+            self.width = Some(width(&columns));
+            Line::Names(columns)
+        } else {
+            let width = self.width.ok_or(CsvError::Columns { line })?;
+            Line::Draw(Numbers { text, line, width })
+        }))
+    }
+}
+
+/// Returns the recorded columns of a line of names; `None` for any other line.
+fn named(text: &str) -> Option<Vec<Column>> {
+    let names: Vec<&str> = text.split(',').collect();
+    names.strip_prefix(&DRAW_COLUMNS).map(columns)
+}
+
+impl Numbers<'_> {
+    /// Parses the draw; its chain and its number are left at 0.
+    pub fn parse(&self) -> Result<DrawRow, CsvError> {
+        let line = self.line;
+        let parse = |s: &str| {
+            let not = |_| CsvError::Number { line, text: s.chars().take(40).collect() };
+            s.parse::<f64>().map_err(not)
+        };
+        let all = self.text.split(',').map(parse).collect::<Result<Vec<f64>, _>>()?;
+        match &all[..] {
+            [log_joint, acceptance, divergent, log_prior, log_likelihood, step, values @ ..]
+                if values.len() == self.width =>
+            {
+                Ok(DrawRow {
+                    chain: 0,
+                    draw: 0,
+                    step: *step as u64,
+                    log_joint: *log_joint,
+                    log_prior: *log_prior,
+                    log_likelihood: *log_likelihood,
+                    acceptance: *acceptance,
+                    divergent: *divergent as u64,
+                    values: values.to_vec(),
+                })
+            }
+            _ => {
+                let expected = self.width + DRAW_COLUMNS.len();
+                Err(CsvError::Width { line, found: all.len(), expected })
+            }
+        }
+    }
+}
+
+/// Reads the draws in the first `end` bytes of a file.
+pub struct DrawReader<R> {
+    lines: Lines<R>,
+    /// The columns of the returned draws, under their names in the file.
+    columns: Vec<Column>,
+    /// The positions of the file's numbers in `columns`.
+    layout: Layout,
+}
+
+impl<R: BufRead> DrawReader<R> {
+    /// Creates a reader of the output of [`super::CsvSink`] with these columns, under
+    /// their names in the file, or with fewer before more were added; nothing at or after
+    /// byte `end` is read.
+    pub fn new(from: R, columns: &[Column], end: u64) -> Self {
+        let (columns, layout) = (columns.to_vec(), Layout::new(&[], &[]));
+        DrawReader { lines: Lines::new(from, end), columns, layout }
+    }
+
+    /// Returns the length of all complete lines read so far, in bytes.
+    pub fn position(&self) -> u64 {
+        self.lines.position
+    }
+
+    /// Reads the next draw; returns `None` at the end or at an incomplete line.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be read, or a line is malformed.
+    pub fn next_row(&mut self) -> Result<Option<DrawRow>, CsvError> {
+        let DrawReader { lines, columns, layout } = self;
+        loop {
+            let line = lines.count + 1;
+            match lines.next_line()? {
+                None => return Ok(None),
+                Some(Line::Comment(_)) => {}
+                Some(Line::Names(now)) => {
+                    let wider = merged(columns, &now);
+                    if wider != *columns {
+                        let (found, expected) = (width(&wider), width(columns));
+                        return Err(CsvError::Width { line, found, expected });
+                    }
+                    *layout = Layout::new(&now, columns);
+                }
+                Some(Line::Draw(numbers)) => {
+                    let row = numbers.parse()?;
+                    return Ok(Some(match layout.is_same(numbers.width) {
+                        true => row,
+                        false => DrawRow { values: layout.apply(&row.values), ..row },
+                    }));
+                }
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -104,5 +296,61 @@ mod tests {
         assert_eq!(found.comments, "# id = 3\n# steps = 9\n");
         let names: Vec<&str> = found.columns.iter().map(|c| &*c.name).collect();
         assert_eq!(names, ["x", "v", "y"]);
+    }
+
+    const TEXT: &str = "# id = 1\nlp__,accept_stat__,divergent__,log_prior__,log_likelihood__,step__,x,v.1,v.2\n-1,1,0,-2,1,5,0.5,1,2\n-3,1,0,-2,1,9,inf,1,2\n";
+
+    fn rows(text: &str, end: usize) -> Result<(usize, u64), CsvError> {
+        let mut reader = DrawReader::new(
+            text.as_bytes(),
+            &[Column::scalar("x"), Column::vector("v", 2)],
+            end as u64,
+        );
+        let mut n = 0;
+        while let Some(row) = reader.next_row()? {
+            assert_eq!((row.step, row.values.len()), ([5, 9][n], 3));
+            n += 1;
+        }
+        Ok((n, reader.position()))
+    }
+
+    #[test]
+    fn draws_come_one_by_one_up_to_an_end() {
+        let first = TEXT.find("-3").unwrap();
+        assert_eq!(rows(TEXT, TEXT.len()).unwrap(), (2, TEXT.len() as u64));
+        assert_eq!(rows(TEXT, first).unwrap(), (1, first as u64));
+        assert_eq!(rows(TEXT, first + 4).unwrap(), (1, first as u64), "half a line is none");
+        assert_eq!(rows(TEXT, 0).unwrap(), (0, 0));
+    }
+
+    #[test]
+    fn columns_that_come_later_are_nan_before() {
+        let names = "lp__,accept_stat__,divergent__,log_prior__,log_likelihood__,step__";
+        let text =
+            format!("{names},v.1\n-1,1,0,-2,1,5,1\n{names},v.1,v.2,x\n-3,1,0,-2,1,9,3,4,7\n");
+        let mut reader = DrawReader::new(
+            text.as_bytes(),
+            &[Column::vector("v", 2), Column::scalar("x")],
+            text.len() as u64,
+        );
+        let mut next = || reader.next_row().unwrap().unwrap().values;
+        let first = next();
+        assert!(first[0] == 1.0 && first[1..].iter().all(|x| x.is_nan()) && first.len() == 3);
+        assert_eq!(next(), [3.0, 4.0, 7.0]);
+        let whole = super::super::read(&text).unwrap();
+        assert_eq!(whole.columns, [Column::vector("v", 2), Column::scalar("x")]);
+        assert!(whole.rows[0].values[1].is_nan() && whole.rows[1].values == [3.0, 4.0, 7.0]);
+    }
+
+    #[test]
+    fn what_is_wrong_is_told() {
+        let error = |text: &str| rows(text, text.len()).unwrap_err().to_string();
+        assert!(error("a,b\n").contains("line 1"));
+        assert!(error(&TEXT.replace(",v.2", "")).contains("9 numbers, but 8 columns"));
+        assert!(
+            error(&TEXT.replace("step__,x", "step__,y")).contains("line 2"),
+            "a column that is not known"
+        );
+        assert!(error(&TEXT.replace("inf", "x")).contains("line 4"));
     }
 }

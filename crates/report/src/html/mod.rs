@@ -25,7 +25,7 @@ pub struct Page<'a> {
     /// Pairs of setting and value.
     pub settings: Vec<(&'a str, String)>,
     /// Pictures in groups; those of a group are side by side.
-    pub pictures: Vec<Vec<Picture<'a>>>,
+    pub pictures: Vec<Vec<Figure<'a>>>,
     /// The scalar quantities.
     pub quantities: &'a [Quantity],
     /// The modes that the chains are in, if there are several.
@@ -38,7 +38,7 @@ pub struct Page<'a> {
     pub warnings: &'a [String],
     /// The approximations that were made.
     pub approximate: &'a [String],
-    /// What the viewer shows ([`super::embedded`]), as JSON.
+    /// The data of the viewer ([`super::embedded`]), as JSON.
     pub scene: Option<&'a str>,
     /// The program's text.
     pub program: &'a str,
@@ -46,12 +46,12 @@ pub struct Page<'a> {
 
 /// A picture on the page.
 #[derive(Clone, Debug, Default)]
-pub struct Picture<'a> {
+pub struct Figure<'a> {
     /// The text below it.
     pub caption: &'a str,
     /// The bytes of a PNG or JPEG file.
     pub file: Vec<u8>,
-    /// Whether it shows bright lines on black; on a bright page they are shown dark on
+    /// True if it shows bright lines on black; on a bright page they are shown dark on
     /// white.
     pub lines: bool,
 }

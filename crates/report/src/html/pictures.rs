@@ -1,7 +1,7 @@
 //! The pictures of a page, and the viewer of its draws.
 
 use super::encode::escaped;
-use super::{Page, Picture};
+use super::{Figure, Page};
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use std::fmt::Write;
 
@@ -34,7 +34,7 @@ pub(super) fn pictures(p: &Page) -> String {
     s
 }
 
-fn figure(s: &mut String, picture: &Picture) {
+fn figure(s: &mut String, picture: &Figure) {
     let (caption, source) = (escaped(picture.caption), source(&picture.file));
     let class = if picture.lines { " class=\"lines\"" } else { "" };
     let _ = writeln!(
@@ -61,7 +61,7 @@ mod tests {
 
     #[test]
     fn pictures_that_belong_together_are_side_by_side() {
-        let of = |lines| Picture { caption: "a picture", file: b"\xff\xd8\xff".to_vec(), lines };
+        let of = |lines| Figure { caption: "a picture", file: b"\xff\xd8\xff".to_vec(), lines };
         let text = pictures(&Page {
             pictures: vec![vec![of(false)], vec![of(true), of(true)]],
             ..Page::default()

@@ -13,7 +13,7 @@ fn the_page_is_whole_and_escapes_what_it_quotes() {
     let text = "</pre><script>alert(1)</script> & \"s\" 'q'";
     let q = quantity(text);
     let kernel = KernelStats { name: text.into(), ..Default::default() };
-    let picture = Picture { caption: text, file: vec![1, 2, 3], lines: false };
+    let picture = Figure { caption: text, file: vec![1, 2, 3], lines: false };
     let page = page(&Page {
         title: text,
         facts: vec![text.into()],

@@ -5,19 +5,14 @@
 //! (0, 0) is the upper left one, and its centre is at (0.5, 0.5). Missing pixels of short
 //! buffers count as background, so no input panics.
 
-mod dots;
-mod font;
 mod layers;
-mod limbs;
 mod sheet;
 mod strokes;
 mod surface;
 
-pub use dots::{DETECTED, OF_SCENE, dots};
 pub use layers::{depth, normals, parts, residuals};
-pub use limbs::limbs;
-pub use sheet::{captioned_sheet, contact_sheet};
-pub use strokes::{contour_map, contours};
+pub use sheet::contact_sheet;
+pub use strokes::{DETECTED, OF_SCENE, contour_map, contours, dots, limbs};
 pub use surface::{frequency, mask, overlaid, overlay, shaded};
 
 /// Pictures are enlarged until their longer side has this many pixels.

@@ -6,7 +6,7 @@ use crate::failure::{Failure, plain};
 use crate::places::sized;
 use crate::reopening::reopened::quoted;
 use crate::{files, resume};
-use pcadlang_report::pictures::{captioned_sheet, png};
+use pcadlang_report::pictures::{contact_sheet, png};
 use pcadlang_report::{number, table};
 use serde_json::Value;
 use std::path::Path;
@@ -63,7 +63,7 @@ pub struct Comparison {
 }
 
 /// A quantity of both runs.
-pub struct Apart {
+pub struct QuantityDifference {
     /// Its name.
     pub name: String,
     /// Its summary in the first run.
@@ -71,7 +71,7 @@ pub struct Apart {
     /// Its summary in the second run.
     pub b: Value,
     /// The difference of its means in units of its standard deviations.
-    pub apart: f64,
+    pub difference: f64,
 }
 
 impl Comparison {
@@ -94,25 +94,30 @@ impl Comparison {
         [only(&left, &right), only(&right, &left)]
     }
 
-    /// Whether both runs have the same value in a field of `run.json`.
+    /// Returns whether both runs have the same value in a field of `run.json`.
     pub fn has_same(&self, field: &str) -> bool {
         self.runs[0].run[field] == self.runs[1].run[field]
     }
 
     /// Returns the quantities of both runs, in decreasing order of their difference.
-    pub fn quantities(&self) -> Vec<Apart> {
+    pub fn quantities(&self) -> Vec<QuantityDifference> {
         let [one, two] = &self.runs;
-        let apart = |name: &str| {
+        let difference = |name: &str| {
             let [a, b] = [one, two].map(|t| (t.number(name, "mean"), t.number(name, "sd")));
             (a.0 - b.0).abs() / (0.5 * (a.1 * a.1 + b.1 * b.1)).sqrt()
         };
         let names = one.summary["quantities"].as_object().into_iter().flatten();
         let both = |(name, a): (&String, &Value)| {
             let b = two.summary["quantities"].get(name)?.clone();
-            Some(Apart { name: name.clone(), a: a.clone(), b, apart: apart(name) })
+            Some(QuantityDifference {
+                name: name.clone(),
+                a: a.clone(),
+                b,
+                difference: difference(name),
+            })
         };
-        let mut all: Vec<Apart> = names.filter_map(both).collect();
-        all.sort_by(|a, b| b.apart.total_cmp(&a.apart));
+        let mut all: Vec<QuantityDifference> = names.filter_map(both).collect();
+        all.sort_by(|a, b| b.difference.total_cmp(&a.difference));
         all
     }
 }
@@ -148,10 +153,10 @@ fn quantities(compared: &Comparison) -> String {
     let head =
         ["quantity", "mean A", "sd A", "mean B", "sd B", "difference/sd", "r_hat A", "r_hat B"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
-    for Apart { name, a, b, apart } in both.iter().take(LISTED) {
+    for QuantityDifference { name, a, b, difference } in both.iter().take(LISTED) {
         let of = |summary: &Value, what: &str| number(summary[what].as_f64().unwrap_or(f64::NAN));
         let mut row = vec![name.clone(), of(a, "mean"), of(a, "sd"), of(b, "mean"), of(b, "sd")];
-        row.extend([number(*apart), of(a, "r_hat"), of(b, "r_hat")]);
+        row.extend([number(*difference), of(a, "r_hat"), of(b, "r_hat")]);
         rows.push(row);
     }
     let mut text = table::aligned(&rows);
@@ -161,7 +166,7 @@ fn quantities(compared: &Comparison) -> String {
     text
 }
 
-/// Writes the overlays side by side.
+/// Writes the overlays side by side, A on the left.
 fn pictures(a: &Compare, out: &Path) -> Result<(), Failure> {
     let overlay = |folder: &Path| {
         let path = folder.join("overlay.png");
@@ -170,7 +175,5 @@ fn pictures(a: &Compare, out: &Path) -> Result<(), Failure> {
         Ok::<_, Failure>(sized(&picture, SIDE))
     };
     let both = [overlay(&a.a)?, overlay(&a.b)?];
-    let captions = [&a.a, &a.b].map(|path| path.display().to_string());
-    let sheet = captioned_sheet(&both, 2, &captions);
-    files::write(out, &png(&sheet).map_err(|e| plain(e.to_string()))?)
+    files::write(out, &png(&contact_sheet(&both, 2)).map_err(|e| plain(e.to_string()))?)
 }

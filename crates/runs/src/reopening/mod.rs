@@ -1,10 +1,8 @@
 //! Runs that have ended: shown, compared, reported.
 
 pub mod compare;
-pub mod date;
 pub mod film;
 pub mod page;
 pub mod reopened;
-pub mod report;
 pub mod seen;
 pub mod show;

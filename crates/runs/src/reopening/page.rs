@@ -1,21 +1,23 @@
-//! `report.html` of a run's folder. The page is made from the files there, and from the
-//! draws. It is written at the end of a run, and again by `pcadlang report`.
-//!
-//! Invariant: a missing or broken file is left out of the page, and does not prevent it.
+//! The page of a run, `report.html`; `pcadlang report` rebuilds it from the run's folder.
 
+use crate::args::Report;
 use crate::embedded::SCENE;
-use crate::failure::Failure;
+use crate::failure::{Failure, plain};
 use crate::files::write_in;
-use crate::places;
-use crate::reopening::date::readable;
+use crate::reopening::reopened::readable;
 use crate::reopening::reopened::{PROGRAM, quoted};
+use crate::watched::ROOM;
+use crate::{files, places, resume};
 use image::RgbImage;
 use pcadlang_inference::draws::KernelStats;
-use pcadlang_report::html::{Page, Picture, page};
+use pcadlang_report::html::{Figure, Page, page};
 use pcadlang_report::pictures::{jpeg, png};
-use pcadlang_report::{Mode, Quantity, RunDir, seconds};
+use pcadlang_report::{
+    Mode, Quantity, RunDir, modes, quantities, rename, reread, seconds, warnings,
+};
 use serde::de::DeserializeOwned;
-use serde_json::Value;
+use serde_json::{Value, json};
+use std::path::PathBuf;
 
 /// The page's file.
 pub const PAGE: &str = "report.html";
@@ -151,7 +153,7 @@ fn settings(run: &Value) -> Vec<(&'static str, String)> {
 }
 
 /// Returns the pictures in a folder, grouped by what is to be compared side by side.
-fn pictures(dir: &RunDir, modes: bool) -> Vec<Vec<Picture<'static>>> {
+fn pictures(dir: &RunDir, modes: bool) -> Vec<Vec<Figure<'static>>> {
     let mut groups =
         vec![vec![PHOTO], vec![OVER], vec![JOINTS], vec![COVERED], vec![EDGES, CONTOURS]];
     groups.extend(modes.then(|| vec![MODES]));
@@ -159,7 +161,7 @@ fn pictures(dir: &RunDir, modes: bool) -> Vec<Vec<Picture<'static>>> {
         let file = std::fs::read(dir.file(name)).ok()?;
         // Lines stay sharp, everything else is a photograph or lies over one.
         let file = if lines { fitted(file)? } else { sized(file)? };
-        Some(Picture { caption, file, lines })
+        Some(Figure { caption, file, lines })
     };
     let found =
         groups.into_iter().map(|group| group.into_iter().filter_map(of).collect::<Vec<_>>());
@@ -187,4 +189,42 @@ fn sized(file: Vec<u8>) -> Option<Vec<u8>> {
     }
     let bytes = jpeg(&image::load_from_memory(&file).ok()?.to_rgb8(), QUALITY).ok()?;
     Some(if bytes.len() < file.len() { bytes } else { file })
+}
+
+/// Rebuilds the page of a run.
+pub fn report(a: &Report) -> Result<(), Failure> {
+    let page = written(a)?;
+    print_line!("{}", page.display());
+    Ok(())
+}
+
+/// Writes the page of a run, and returns its path.
+pub fn written(a: &Report) -> Result<PathBuf, Failure> {
+    let run = resume::run(&a.run)?;
+    let dir = RunDir::open(&a.run).map_err(|e| plain(e.to_string()))?;
+    let draws = reread(&dir, ROOM).map_err(|e| plain(e.to_string()))?;
+    if draws.iter().all(|d| d.rows.is_empty()) {
+        let hint = run["error"].as_str().map(|e| format!("the run failed: {e}"));
+        return Err(Failure::Plain(format!("{} holds no draws to report", a.run.display()), hint));
+    }
+    let mut quantities = quantities(&draws);
+    let summary = match dir.file("summary.json") {
+        path if path.is_file() => {
+            let summary = serde_json::from_slice(&files::read(&path)?);
+            summary.map_err(|e| plain(format!("{}: {e}", path.display())))?
+        }
+        // The run has not ended, or was killed.
+        _ => so_far(&quantities, draws.len()),
+    };
+    let names: Vec<&String> =
+        summary["quantities"].as_object().into_iter().flat_map(|q| q.keys()).collect();
+    rename(&mut quantities, names.into_iter().map(String::as_str));
+    write_page(&dir, &run, &summary, &quantities)?;
+    Ok(dir.file(PAGE))
+}
+
+/// Makes a summary from the draws alone.
+fn so_far(quantities: &[Quantity], chains: usize) -> Value {
+    let modes = modes(quantities, None);
+    json!({ "modes": modes, "warnings": warnings(quantities, &modes, &[], chains) })
 }

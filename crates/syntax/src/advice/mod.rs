@@ -23,7 +23,7 @@ pub(crate) struct Context<'a, 's> {
     pub start: usize,
     /// The tokens that would have fitted, as the parser names them.
     pub expected: &'a [String],
-    /// Whether the statement may merely lack its semicolon.
+    /// True if the statement may merely lack its semicolon.
     pub semicolon: bool,
 }
 

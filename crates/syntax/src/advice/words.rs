@@ -1,6 +1,7 @@
 //! Rules about words: statements of other languages, and misplaced keywords.
 
 use super::{Advice, Rules, say};
+use crate::elsewhere::{Before, FOREIGN_STATEMENTS};
 use crate::token::Token;
 
 impl Rules<'_, '_> {
@@ -14,46 +15,15 @@ impl Rules<'_, '_> {
         let named = matches!(self.token(start + 1), Some(Token::Name(_)));
         let brace = |i| self.token(i) == Some(&Token::LBrace);
         let block = brace(start + 1) || (named && brace(start + 2));
-        let hint = match word {
-            "def" | "function" | "func" | "fun" | "defun" | "define" if named => {
-                "a function is declared by `fn f(x) { … }`; its value is the last expression, without `;`"
-            }
-            "return" | "yield" => "the value of a body is its last expression, without `;`",
-            "var" | "const" | "val" | "auto" | "mut" | "set" if named => {
-                "a value is bound by `let x = e;`, a random choice made by `x ~ d;`"
-            }
-            "int" | "real" | "float" | "double" | "bool" | "string" | "vector" | "matrix"
-            | "array"
-                if named =>
-            {
-                "names are not declared: `let x = e;` binds a value, `x ~ d;` makes a random choice"
-            }
-            "import" | "from" | "using" | "use" | "require" | "load" => {
-                "another file is read by `include \"file.pcad\" as name;`"
-            }
-            "model" | "parameters" | "transformed" | "generated" | "program" | "module"
-            | "begin"
-                if block =>
-            {
-                "the statements of a model are written at the top level, one after another"
-            }
-            "while" | "loop" | "do" | "until" => {
-                "write `for i in a .. b { … }`, or a function that calls itself"
-            }
-            "elif" | "elseif" | "elsif" => "write `else if`",
-            "switch" | "match" | "case" | "cond" => "write `if … { } else if … { } else { }`",
-            "class" | "struct" | "type" | "enum" if named => "a record is written `{ x: 1, y: 2 }`",
-            "print" | "echo" | "show" => "write `report e;`",
-            "query" | "condition" | "constrain" => {
-                "`observe d = v;` observes data, `factor(logw);` adds a soft constraint"
-            }
-            "del" | "delete" => "`forget name;` removes an observation",
-            "global" | "local" | "static" | "public" | "private" => {
-                "a name is visible after the statement that binds it"
-            }
-            _ => return None,
-        };
-        let advice = say(format!("there is no `{word}`"), "", hint);
+        let (_, _, hint) = FOREIGN_STATEMENTS.iter().find(|(words, before, _)| {
+            let fits = match before {
+                Before::Anything => true,
+                Before::Name => named,
+                Before::Block => block,
+            };
+            fits && words.split(' ').any(|w| w == word)
+        })?;
+        let advice = say(format!("there is no `{word}`"), "", *hint);
         advice.map(|advice| Advice { place: Some(start), ..advice })
     }
 

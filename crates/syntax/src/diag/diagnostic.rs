@@ -23,7 +23,7 @@ pub struct Label {
     pub span: Span,
     /// The text; may be empty.
     pub text: String,
-    /// Whether the span is the location of the error itself (underlined with `^`) or
+    /// True for the location of the error itself (underlined with `^`), false for a span that
     /// helps to explain it (`-`).
     pub primary: bool,
 }
@@ -33,7 +33,7 @@ pub struct Label {
 pub struct Diagnostic {
     /// The severity.
     pub severity: Severity,
-    /// What is wrong, in one line.
+    /// The error, in one line.
     pub message: String,
     /// The relevant spans of the source.
     pub labels: Vec<Label>,
@@ -79,6 +79,16 @@ impl Diagnostic {
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
         self.hints.push(hint.into());
         self
+    }
+
+    /// Adds a hint in place.
+    pub fn hint_also(&mut self, hint: impl Into<String>) {
+        self.hints.push(hint.into());
+    }
+
+    /// Adds a label that helps to explain the error, in place.
+    pub fn point_at(&mut self, span: Span, text: &str) {
+        self.labels.push(Label { span, text: text.into(), primary: false });
     }
 
     /// Adds a note.

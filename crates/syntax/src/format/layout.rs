@@ -5,7 +5,7 @@
 //! `map(fn(x) {`, the body, `}, xs)`.
 
 use super::columns::{self, Row, SourcePlace, Stop};
-use super::source::{Comment, Place};
+use super::token_cursor::{Comment, Place};
 use std::borrow::Cow;
 
 /// When a line is broken.
@@ -172,7 +172,7 @@ struct Setter<'a, 's> {
     groups: Vec<bool>,
     /// The number of line ends to write before the next text.
     breaks: usize,
-    /// Whether to write a space before the next text, if it stays on the line.
+    /// True to write a space before the next text, if it stays on the line.
     space: bool,
     /// Set if the last text was a comment that needs a line end after it; true if the
     /// comment runs to the end of its line.

@@ -14,8 +14,8 @@ mod columns;
 mod expressions;
 mod layout;
 mod printer;
-mod source;
 mod statements;
+mod token_cursor;
 
 use super::ast::{Expr, Program};
 use super::error::SyntaxError;

@@ -2,17 +2,17 @@
 //! them.
 
 use super::layout::{Kind, Layout, Rule};
-use super::source::{Comment, Place, Source};
+use super::token_cursor::{Comment, Place, TokenCursor};
 use std::fmt::Display;
 
 /// Walks a tree and lays out its text; if there is a source, takes the tokens from it.
 #[derive(Debug, Default)]
 pub(super) struct Printer<'s> {
     layout: Layout<'s>,
-    pub source: Option<Source<'s>>,
+    pub source: Option<TokenCursor<'s>>,
     /// Comments to be written behind the last token.
     behind: Vec<Comment<'s>>,
-    /// Whether this is in a computed key, which must stay on its line.
+    /// True if this is in a computed key, which must stay on its line.
     pub inline: bool,
 }
 
@@ -29,7 +29,7 @@ pub(super) enum Share {
 
 impl<'s> Printer<'s> {
     pub fn formatting(text: &'s str) -> Self {
-        Printer { source: Some(Source::new(text)), ..Printer::default() }
+        Printer { source: Some(TokenCursor::new(text)), ..Printer::default() }
     }
 
     /// Returns the text of everything printed.
@@ -105,7 +105,7 @@ impl<'s> Printer<'s> {
     /// Returns whether the source has a line end behind the bracket that was just
     /// written.
     fn opened(&self) -> bool {
-        self.source.as_ref().is_some_and(Source::ended_line)
+        self.source.as_ref().is_some_and(TokenCursor::ended_line)
     }
 
     pub fn line(&mut self, flat: &'static str, rule: Rule) {
@@ -184,7 +184,7 @@ impl<'s> Printer<'s> {
     ) {
         self.text(open);
         let remarks =
-            !self.behind.is_empty() || self.source.as_ref().is_some_and(Source::has_comments);
+            !self.behind.is_empty() || self.source.as_ref().is_some_and(TokenCursor::has_comments);
         match items {
             [] if !remarks => return self.text(close),
             [only] if share == Share::Brackets && !remarks => {
@@ -203,7 +203,7 @@ impl<'s> Printer<'s> {
         self.flush();
         self.layout.indent();
         for (i, item) in items.iter().enumerate() {
-            let starts_line = opened && self.source.as_ref().is_some_and(Source::ended_line);
+            let starts_line = opened && self.source.as_ref().is_some_and(TokenCursor::ended_line);
             let rule = match share {
                 Share::Lines if i > 0 && starts_line => Rule::Kept,
                 Share::Lines if i > 0 => Rule::Fill,
@@ -260,7 +260,7 @@ impl<'s> Printer<'s> {
     pub fn braces(&mut self, lines: usize, mut print: impl FnMut(&mut Self, usize)) {
         self.text("{");
         let remarks =
-            !self.behind.is_empty() || self.source.as_ref().is_some_and(Source::has_comments);
+            !self.behind.is_empty() || self.source.as_ref().is_some_and(TokenCursor::has_comments);
         if lines == 0 && !remarks {
             return self.text("}");
         }
@@ -285,7 +285,7 @@ impl<'s> Printer<'s> {
     /// Returns whether the next block is on several lines in the source; without a
     /// source, returns `canonical`.
     pub fn opens_lines(&self, canonical: bool) -> bool {
-        self.source.as_ref().map_or(canonical, Source::opens_lines)
+        self.source.as_ref().map_or(canonical, TokenCursor::opens_lines)
     }
 
     /// Prints all lines of a file.

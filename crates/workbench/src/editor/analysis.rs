@@ -8,7 +8,7 @@ use pcadlang_syntax::diag::{Diagnostic, SourceMap};
 use pcadlang_syntax::span::{FileId, Span};
 use std::sync::Arc;
 
-/// What is known of a program's text, as if it were a file with that name. The text is
+/// The analysis of a program's text, as if it were a file with that name. The text is
 /// file 0; the files it includes follow.
 pub struct Analysis {
     /// The text and the files that it includes.

@@ -1,8 +1,8 @@
-//! What may be written at a place in a program.
+//! Completion: the words that fit at a position in a program.
 
 use super::Analysis;
 use super::names::BindingKind;
-use super::words::{self, KEYWORDS, KINDS};
+use super::words::{self, KINDS};
 use pcadlang_engine::lang::builtins::Kind;
 use pcadlang_syntax::{Class, STATEMENTS, classes};
 use std::path::Path;
@@ -12,13 +12,13 @@ use std::path::Path;
 pub struct Candidate {
     /// The word.
     pub word: String,
-    /// What it is.
+    /// Its kind.
     pub kind: CandidateKind,
     /// One line about it.
     pub detail: String,
 }
 
-/// What a candidate is.
+/// The kind of a candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CandidateKind {
     /// A name of the program.
@@ -159,7 +159,8 @@ fn keywords() -> impl Iterator<Item = Candidate> {
         kind: CandidateKind::Keyword,
         detail: s.doc.to_owned(),
     });
-    statements.chain(KEYWORDS.iter().map(|k| plain((*k).to_owned(), CandidateKind::Keyword)))
+    let others = pcadlang_syntax::keywords().filter(|k| STATEMENTS.iter().all(|s| s.name != *k));
+    statements.chain(others.map(|k| plain(k.to_owned(), CandidateKind::Keyword)))
 }
 
 fn plain(word: String, kind: CandidateKind) -> Candidate {

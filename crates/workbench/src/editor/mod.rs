@@ -1,11 +1,9 @@
-//! What an editor asks about the text of a program: its mistakes, what a name means and
+//! Answers to an editor about the text of a program: its mistakes, what a name means and
 //! where else it stands, what may be written here, which choices there are. Nothing is
 //! run; protocols are the command's affair (`pcadlang lsp`).
 
 mod analysis;
 mod completion;
-mod hints;
-mod hover;
 mod names;
 mod resolve;
 mod symbols;
@@ -13,6 +11,5 @@ pub mod words;
 
 pub use analysis::{Analysis, CannotRename};
 pub use completion::{Candidate, CandidateKind};
-pub use hints::Hint;
 pub use names::{Binding, BindingId, BindingKind, Names, Occurrence};
-pub use symbols::{Piece, PieceKind};
+pub use symbols::{Hint, Piece, PieceKind};

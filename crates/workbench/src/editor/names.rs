@@ -6,7 +6,7 @@ use std::sync::Arc;
 /// The index of a binding in [`Names::bindings`].
 pub type BindingId = usize;
 
-/// What a name is bound to.
+/// The kind of thing that a name is bound to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BindingKind {
     /// A `param`.
@@ -60,7 +60,7 @@ impl BindingKind {
 pub struct Binding {
     /// The name.
     pub name: Arc<str>,
-    /// What it is.
+    /// Its kind.
     pub kind: BindingKind,
     /// The name where it is bound.
     pub span: Span,
@@ -77,7 +77,7 @@ pub struct Binding {
 pub struct Occurrence {
     /// The name there.
     pub span: Span,
-    /// What it means.
+    /// The binding that it refers to.
     pub binding: BindingId,
 }
 
@@ -126,7 +126,7 @@ impl Names {
         })
     }
 
-    /// Whether a choice with this name may be part of an address that is not resolved.
+    /// Returns whether a choice with this name may be part of an address that is not resolved.
     pub fn is_segment(&self, name: &str) -> bool {
         self.segments.iter().any(|s| &**s == name)
     }

@@ -39,7 +39,7 @@ impl Names {
 struct Local {
     names: Scope,
     span: Span,
-    /// Whether choices with keys belong to a block further out.
+    /// True if choices with keys belong to a block further out.
     is_loop: bool,
 }
 

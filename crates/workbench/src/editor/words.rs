@@ -3,9 +3,6 @@
 use pcadlang_syntax::{Class, classes};
 use std::path::Path;
 
-/// Keywords that do not begin a statement.
-pub const KEYWORDS: &[&str] = &["else", "and", "or", "not", "true", "false"];
-
 /// Tags that choices get from their distributions.
 pub const KINDS: &[&str] = &["$continuous", "$discrete", "$finite", "$gaussian"];
 

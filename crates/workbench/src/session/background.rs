@@ -60,7 +60,7 @@ pub struct Status {
     /// How much of the phase is done, and the total: steps while sampling a given number
     /// of them, otherwise passes of the plan's loop. The total is 0 if it is unknown.
     pub done: (u64, u64),
-    /// Whether the run has ended.
+    /// True if the run has ended.
     pub is_done: bool,
 }
 

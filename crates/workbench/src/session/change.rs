@@ -1,9 +1,10 @@
 //! Manual changes of the state: `:flip`, `:set`, `:draw`.
 
 use super::look::{ROWS, addressed, more};
-use super::reply::{Reply, Trouble};
+use super::reply::Reply;
 use super::shown::{self, short};
 use super::state::Session;
+use crate::failure::{Failure, plain};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::{Address, Draws, Given, Trace};
 use pcadlang_inference::{StepContext, accepts};
@@ -49,7 +50,7 @@ fn signed(x: f64) -> String {
 impl Session {
     /// `:flip sel`: a Metropolis-Hastings step with proposals from the prior, like that
     /// of the kernel `block`.
-    pub(super) fn flip(&mut self, text: &str) -> Result<Reply, Trouble> {
+    pub(super) fn flip(&mut self, text: &str) -> Result<Reply, Failure> {
         let found = self.select(text)?;
         let targets: Vec<_> = found.iter().map(|(_, t)| *t).collect();
         let old: Vec<_> = targets.iter().map(|t| self.trace.value(*t)).collect();
@@ -64,7 +65,7 @@ impl Session {
                     e.message
                 )));
             }
-            Err(e) => return Err(Trouble::run(&self.model, *e)),
+            Err(e) => return Err(Failure::run(&self.model, *e)),
         };
         let mut s = String::new();
         for ((address, t), old) in found.iter().zip(&old).take(ROWS) {
@@ -95,16 +96,16 @@ impl Session {
     }
 
     /// `:set @a value`, `:set param value`.
-    pub(super) fn set(&mut self, text: &str) -> Result<Reply, Trouble> {
+    pub(super) fn set(&mut self, text: &str) -> Result<Reply, Failure> {
         let (name, value) = split_address(text);
         if value.is_empty() {
-            return Err(Trouble::plain("`:set` needs an address and a value").hint(":set @x 1.5"));
+            return Err(plain("`:set` needs an address and a value").hint(":set @x 1.5"));
         }
         if self.is_param(name) {
             return self.set_param(name, value);
         }
         let value = self.value_of(value)?;
-        let address = addressed(name).parse().map_err(|e| Trouble::plain(format!("{e}")))?;
+        let address = addressed(name).parse().map_err(|e| plain(format!("{e}")))?;
         let past = self.remember(&format!(":set {text}"));
         let (before, after) = self.give(address, value)?;
         self.keep(past);
@@ -118,8 +119,8 @@ impl Session {
     /// # Errors
     /// If there is no such address, the value does not fit it, or the state would have
     /// probability zero; nothing has changed then.
-    pub fn assign(&mut self, address: &str, value: Value, joins: bool) -> Result<Scores, Trouble> {
-        let at: Address = addressed(address).parse().map_err(|e| Trouble::plain(format!("{e}")))?;
+    pub fn assign(&mut self, address: &str, value: Value, joins: bool) -> Result<Scores, Failure> {
+        let at: Address = addressed(address).parse().map_err(|e| plain(format!("{e}")))?;
         let is_same = joins && self.dragged.as_ref() == Some(&at);
         let past = (!is_same).then(|| self.remember(&format!(":set {address} {}", short(&value))));
         self.clock += 1;
@@ -133,26 +134,23 @@ impl Session {
 
     /// Gives a value to a choice or an observation. Returns the log densities before and
     /// after.
-    fn give(&mut self, address: Address, value: Value) -> Result<(Scores, Scores), Trouble> {
+    fn give(&mut self, address: Address, value: Value) -> Result<(Scores, Scores), Failure> {
         let before = Scores::of(&self.trace);
         let given = [(address, Given::Value(value))];
-        self.trace.update(&given, self.values()).map_err(|e| Trouble::run(&self.model, *e))?;
+        self.trace.update(&given, self.values()).map_err(|e| Failure::run(&self.model, *e))?;
         let after = Scores::of(&self.trace);
         if after.joint == f64::NEG_INFINITY && before.joint > f64::NEG_INFINITY {
             let by: Vec<String> =
                 self.trace.impossible().iter().take(3).map(|(a, _)| a.to_string()).collect();
             self.trace.rollback();
-            return Err(Trouble::plain(format!(
-                "that state has probability zero, by {}",
-                by.join(", ")
-            )));
+            return Err(plain(format!("that state has probability zero, by {}", by.join(", "))));
         }
         self.trace.commit();
         Ok((before, after))
     }
 
     /// `:draw`.
-    pub(super) fn draw(&mut self) -> Result<Reply, Trouble> {
+    pub(super) fn draw(&mut self) -> Result<Reply, Failure> {
         let past = self.remember(":draw");
         let (mut trace, said) = self.restart(&self.model, &[], self.trace.replacements())?;
         self.force(&self.model, &mut trace, 0)?;

@@ -12,7 +12,7 @@ use serde_json::{Number, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// The most elements of an array that are written out.
+/// Maximum elements of an array that are written out.
 const ELEMENTS: usize = 1000;
 
 /// A choice.
@@ -63,7 +63,7 @@ impl ChoiceRow {
     }
 }
 
-/// What a program says of its choices beside their distributions.
+/// The marks that a program gives its choices, apart from their distributions.
 #[derive(Clone, Debug, Default)]
 pub struct Marks {
     /// The choices that `force` statements set.

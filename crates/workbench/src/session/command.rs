@@ -1,7 +1,8 @@
 //! The commands, which begin with a colon.
 
-use super::reply::{Reply, Request, Trouble};
+use super::reply::{Reply, Request};
 use super::state::Session;
+use crate::failure::{Failure, plain};
 use pcadlang_engine::lang::builtins::search::search;
 use pcadlang_engine::lang::builtins::{Builtin, Table, doc};
 use pcadlang_syntax::diag::nearest;
@@ -81,15 +82,15 @@ pub(super) fn alias(word: &str) -> Option<&'static str> {
 
 impl Session {
     /// Runs a command, given without its colon.
-    pub(super) fn command(&mut self, text: &str) -> Result<Reply, Trouble> {
+    pub(super) fn command(&mut self, text: &str) -> Result<Reply, Failure> {
         let (name, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
         let rest = rest.trim();
         if let Some(c) = COMMANDS.iter().find(|c| c.name == name) {
             if c.takes.is_empty() && !rest.is_empty() {
-                return Err(Trouble::plain(format!("`:{name}` takes no arguments, got `{rest}`")));
+                return Err(plain(format!("`:{name}` takes no arguments, got `{rest}`")));
             }
             if !c.takes.is_empty() && !c.takes.starts_with('[') && rest.is_empty() {
-                return Err(Trouble::plain(format!("`:{name}` needs {}", c.takes)).hint(c.doc));
+                return Err(plain(format!("`:{name}` needs {}", c.takes)).hint(c.doc));
             }
         }
         match name {
@@ -123,7 +124,7 @@ impl Session {
                 let hint = near.map_or("`:help` lists the commands".to_owned(), |n| {
                     format!("did you mean `:{n}`?")
                 });
-                Err(Trouble::plain(format!("there is no command `:{name}`")).hint(hint))
+                Err(plain(format!("there is no command `:{name}`")).hint(hint))
             }
         }
     }
@@ -136,7 +137,7 @@ impl Session {
         Reply::text(numbered.collect::<String>())
     }
 
-    fn doc(&self, name: &str) -> Result<Reply, Trouble> {
+    fn doc(&self, name: &str) -> Result<Reply, Failure> {
         if name.is_empty() {
             return Ok(Reply::text(
                 "`:doc NAME` explains `observe`, `normal` or `:flip`; Tab completes names\n",
@@ -156,11 +157,10 @@ impl Session {
             return Ok(Reply::text(text));
         }
         let names: Vec<String> = self.topics().collect();
-        let trouble =
-            Trouble::plain(format!("there is no statement, built-in or command `{name}`"));
+        let failure = plain(format!("there is no statement, built-in or command `{name}`"));
         Err(match nearest(name, names.iter().map(String::as_str)) {
-            Some(n) => trouble.hint(format!("did you mean `{n}`?")),
-            None => trouble.hint("`:help` lists the commands, `pcadlang doc` all built-ins"),
+            Some(n) => failure.hint(format!("did you mean `{n}`?")),
+            None => failure.hint("`:help` lists the commands, `pcadlang doc` all built-ins"),
         })
     }
 }

@@ -2,9 +2,7 @@
 
 use super::command::COMMANDS;
 use super::state::Session;
-use crate::editor::words::{
-    KEYWORDS, KINDS, enclosing_call, files, files_wanted, open_string, start_of,
-};
+use crate::editor::words::{KINDS, enclosing_call, files, files_wanted, open_string, start_of};
 use pcadlang_engine::lang::builtins::{Kind, Type};
 use pcadlang_engine::lang::code::BlockKind;
 use pcadlang_syntax::STATEMENTS;
@@ -118,8 +116,7 @@ impl Session {
         let arguments =
             enclosing_call(&before[..start]).map(|name| self.arguments(&name)).unwrap_or_default();
         let globals = self.model.code().globals.keys().map(|n| n.replace('/', "."));
-        let keywords =
-            STATEMENTS.iter().map(|s| s.name).chain(KEYWORDS.iter().copied()).map(str::to_owned);
+        let keywords = pcadlang_syntax::keywords().map(str::to_owned);
         found(
             start,
             word,

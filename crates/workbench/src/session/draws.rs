@@ -83,8 +83,6 @@ mod tests {
                 draw,
                 step: draw,
                 log_joint,
-                log_prior: 0.0,
-                log_likelihood: 0.0,
                 values: vec![0.5],
                 ..DrawRow::default()
             };

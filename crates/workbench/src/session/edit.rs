@@ -1,13 +1,14 @@
 //! Directives: they are added to the program, and the trace is rebuilt with the choices
 //! that it had.
 
-use super::export::{exported, exported_operand};
+use super::files::{exported, exported_operand};
 use super::redefine::{
     Key, Space, forgotten, items, key, to_forget, users, with_item, without_item,
 };
-use super::reply::{Reply, Trouble};
+use super::reply::Reply;
 use super::shown;
 use super::state::{INPUT, Session};
+use crate::failure::{Failure, plain};
 use pcadlang_engine::lang::code::{BlockKind, Operand};
 use pcadlang_engine::lang::load::reason;
 use pcadlang_engine::lang::value::Value;
@@ -41,7 +42,7 @@ struct Entry {
 impl Session {
     /// Adds directives to the program, runs the inference blocks among them, and
     /// describes the results.
-    pub(super) fn add(&mut self, text: &str) -> Result<Reply, Trouble> {
+    pub(super) fn add(&mut self, text: &str) -> Result<Reply, Failure> {
         if let Some(name) = forgotten(text) {
             return self.forget(name);
         }
@@ -80,7 +81,7 @@ impl Session {
     /// Adds items, some of which rebind names of the program. These items replace the old
     /// ones, in the text and for everything that uses them. Returns a description of the
     /// users; their values are shown, too.
-    fn redefine(&mut self, entry: &mut Entry, again: &[Key]) -> Result<String, Trouble> {
+    fn redefine(&mut self, entry: &mut Entry, again: &[Key]) -> Result<String, Failure> {
         let text = |moved: bool| {
             entry.items.iter().fold(self.text().to_owned(), |text, (name, item)| {
                 let Some(name) = name.as_ref().filter(|k| again.contains(k)) else {
@@ -101,7 +102,7 @@ impl Session {
             Err(first) => match self
                 .program
                 .edited(&moved)
-                .map_err(Trouble::from)
+                .map_err(Failure::from)
                 .and_then(|p| self.rewrite(p))
             {
                 Ok(said) => (said, moved),
@@ -143,7 +144,7 @@ impl Session {
 
     /// Resamples the choices below some names, if that gives a state of positive
     /// probability. Returns whether it did.
-    fn redraw(&mut self, names: &[Key]) -> Result<bool, Trouble> {
+    fn redraw(&mut self, names: &[Key]) -> Result<bool, Failure> {
         let below = |a: &Address| {
             names.iter().any(|(_, n)| a.segments.first().is_some_and(|s| s.name == *n))
         };
@@ -165,14 +166,14 @@ impl Session {
     }
 
     /// `forget name`: removes an item from the program.
-    fn forget(&mut self, name: &str) -> Result<Reply, Trouble> {
+    fn forget(&mut self, name: &str) -> Result<Reply, Failure> {
         let key = to_forget(self.text(), name)?;
         let Some(text) = without_item(self.text(), &key) else {
-            return Err(Trouble::plain("there is no such item"));
+            return Err(plain("there is no such item"));
         };
         let past = self.remember(&format!("forget {name}"));
         let said =
-            match self.program.edited(&text).map_err(Trouble::from).and_then(|p| self.rewrite(p)) {
+            match self.program.edited(&text).map_err(Failure::from).and_then(|p| self.rewrite(p)) {
                 Ok(said) => said,
                 Err(e) => {
                     let users = users(self.text(), name);
@@ -181,7 +182,7 @@ impl Session {
                     };
                     let hint =
                         format!("forget `{first}` first, or bind `{name}` again to replace it");
-                    return Err(Trouble::plain(format!("`{first}` uses `{name}`")).hint(hint));
+                    return Err(plain(format!("`{first}` uses `{name}`")).hint(hint));
                 }
             };
         self.keep(past);
@@ -192,7 +193,7 @@ impl Session {
     ///
     /// # Errors
     /// If the new text has errors; nothing has changed then.
-    pub fn replace(&mut self, text: &str) -> Result<Reply, Trouble> {
+    pub fn replace(&mut self, text: &str) -> Result<Reply, Failure> {
         if text == self.text() {
             return Ok(Reply::text("the program is unchanged\n"));
         }
@@ -206,7 +207,7 @@ impl Session {
 
     /// Switches to another version of the program, and keeps the choices that both share.
     /// Returns notes for the user.
-    pub(super) fn rewrite(&mut self, program: Program) -> Result<String, Trouble> {
+    pub(super) fn rewrite(&mut self, program: Program) -> Result<String, Failure> {
         let model = program.clone().compile()?;
         let choices = self.trace.constraints();
         let (mut trace, said) = self.restart(&model, &choices, self.trace.replacements())?;
@@ -223,11 +224,11 @@ impl Session {
         entry: &Entry,
         known: (usize, usize),
         said: &mut String,
-    ) -> Result<(), Trouble> {
+    ) -> Result<(), Failure> {
         for name in &entry.names {
             let draws = self.looks();
             if let Some(value) = self.trace.global(name, draws) {
-                let value = value.map_err(|e| Trouble::run(&self.model, *e))?;
+                let value = value.map_err(|e| Failure::run(&self.model, *e))?;
                 *said += &format!("{name} = {}\n", shown::short(&value));
             }
         }
@@ -246,23 +247,23 @@ impl Session {
     }
 
     /// Returns the value of an expression in the current state.
-    pub(super) fn value_of(&mut self, text: &str) -> Result<Value, Trouble> {
+    pub(super) fn value_of(&mut self, text: &str) -> Result<Value, Failure> {
         let model = self.program.with_query(INPUT, text)?.compile()?;
         let mut trace = self.moved_to(&model, &self.trace)?;
         let Some(operand) = model.code().samples.last().copied() else {
-            return Err(Trouble::plain("this is not an expression"));
+            return Err(plain("this is not an expression"));
         };
-        let values = trace.query(&[operand], self.looks()).map_err(|e| Trouble::run(&model, *e))?;
+        let values = trace.query(&[operand], self.looks()).map_err(|e| Failure::run(&model, *e))?;
         Ok(values.into_iter().next().unwrap_or_default())
     }
 
     /// Returns a trace of another model with the same choices and observed values.
-    pub(super) fn moved_to(&self, model: &Model, from: &Trace) -> Result<Trace, Trouble> {
+    pub(super) fn moved_to(&self, model: &Model, from: &Trace) -> Result<Trace, Failure> {
         self.restart(model, &from.constraints(), from.replacements()).map(|(t, _)| t)
     }
 
     /// Sets a param. The default of a param in the main file is changed in the text.
-    pub(super) fn set_param(&mut self, name: &str, value: &str) -> Result<Reply, Trouble> {
+    pub(super) fn set_param(&mut self, name: &str, value: &str) -> Result<Reply, Failure> {
         let (program, _) = parse(self.text(), SourceMap::new().add("", self.text()));
         let declared = program.items.iter().find_map(|i| match &i.kind {
             ItemKind::Param(d) if *d.name.node == *name => Some(d),
@@ -293,7 +294,7 @@ impl Session {
     }
 
     /// Shows the values of the reports after the first `known`.
-    fn report(&mut self, known: usize, said: &mut String) -> Result<(), Trouble> {
+    fn report(&mut self, known: usize, said: &mut String) -> Result<(), Failure> {
         let model = Arc::clone(&self.model);
         for e in model.reports().iter().skip(known).flat_map(|r| &r.exprs) {
             if let Some(operand) = model.code().queries.get(&e.span) {
@@ -304,24 +305,24 @@ impl Session {
     }
 
     /// Writes the files of the exports after the first `known`.
-    fn export(&mut self, known: usize, said: &mut String) -> Result<(), Trouble> {
+    fn export(&mut self, known: usize, said: &mut String) -> Result<(), Failure> {
         let model = Arc::clone(&self.model);
         for x in model.exports().iter().skip(known) {
             let Some(operand) = exported_operand(model.code(), x) else { continue };
             self.permit(&x.file)?;
-            let bytes = exported(&self.asked(operand)?, &x.file).map_err(Trouble::plain)?;
+            let bytes = exported(&self.asked(operand)?, &x.file).map_err(plain)?;
             write_file(Path::new(&*x.file), &bytes)
-                .map_err(|e| Trouble::plain(format!("cannot write {}: {}", x.file, reason(&e))))?;
+                .map_err(|e| plain(format!("cannot write {}: {}", x.file, reason(&e))))?;
             *said += &format!("{}\n", x.file);
         }
         Ok(())
     }
 
     /// Returns the value of a top-level operand.
-    fn asked(&mut self, operand: Operand) -> Result<Value, Trouble> {
+    fn asked(&mut self, operand: Operand) -> Result<Value, Failure> {
         let draws = self.looks();
         let values =
-            self.trace.query(&[operand], draws).map_err(|e| Trouble::run(&self.model, *e))?;
+            self.trace.query(&[operand], draws).map_err(|e| Failure::run(&self.model, *e))?;
         Ok(values.into_iter().next().unwrap_or_default())
     }
 }

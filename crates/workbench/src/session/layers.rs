@@ -1,4 +1,4 @@
-//! What of a scene a picture shows: its surface over the photograph, its depth, its
+//! The layers of a picture of a scene: its surface over the photograph, its depth, its
 //! contours beside those of the photograph.
 
 use super::picture::detected;
@@ -11,7 +11,7 @@ use pcadlang_scene::render::View;
 use pcadlang_scene::vision::{ContourMap, Photo};
 use std::sync::Arc;
 
-/// What a picture shows.
+/// A layer of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
     /// The surface and its contours over the photograph, with detected joints.

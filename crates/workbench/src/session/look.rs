@@ -1,10 +1,11 @@
-//! `:trace`: the choices of the state.
+//! `:trace`: the choices of the state; `:why`: the dependencies of one.
 
-use super::reply::{Reply, Trouble};
+use super::reply::Reply;
 use super::shown;
 use super::state::{INPUT, Session};
+use crate::failure::{Failure, plain};
 use pcadlang_engine::lang::plan::{Formula, Selection};
-use pcadlang_engine::trace::{Address, Selector, Target};
+use pcadlang_engine::trace::{Address, Effect, Selector, Target, Term};
 use pcadlang_inference::{not_a_selection, selected};
 use pcadlang_library::model::Error;
 use pcadlang_report::number;
@@ -18,7 +19,7 @@ pub(super) const ROWS: usize = 40;
 
 impl Session {
     /// `:trace [sel]`.
-    pub(super) fn show_trace(&mut self, selection: &str) -> Result<Reply, Trouble> {
+    pub(super) fn show_trace(&mut self, selection: &str) -> Result<Reply, Failure> {
         let all = selection.is_empty();
         let targets = if all { self.by_address(&Selector::All) } else { self.select(selection)? };
         let t = &self.trace;
@@ -51,11 +52,11 @@ impl Session {
 
     /// Returns the choices of a typed selection, in order of address. An empty selection
     /// is an error.
-    pub(super) fn select(&mut self, text: &str) -> Result<Vec<(Address, Target)>, Trouble> {
+    pub(super) fn select(&mut self, text: &str) -> Result<Vec<(Address, Target)>, Failure> {
         let text = &addressed(text);
         let mut sources = SourceMap::new();
         let file = sources.add(INPUT, text);
-        let wrong = |diagnostics, sources| Trouble::from(Error { diagnostics, sources });
+        let wrong = |diagnostics, sources| Failure::from(Error { diagnostics, sources });
         let expr = match parse_expr(text, file) {
             Ok(e) => e,
             Err(errors) => {
@@ -71,8 +72,8 @@ impl Session {
             let value = self.value_of(&print_expr(key)).map_err(|e| failed = Some(e));
             Formula::constant(value.unwrap_or_default(), key.span)
         });
-        if let Some(trouble) = failed {
-            return Err(trouble);
+        if let Some(failure) = failed {
+            return Err(failure);
         }
         let selector = selection
             .map_err(not_a_selection)
@@ -86,13 +87,13 @@ impl Session {
         }
         let known: Vec<String> =
             self.trace.all_targets().iter().map(|t| self.trace.address(*t).to_string()).collect();
-        let trouble = Trouble::plain(format!("`{text}` selects no choice in the trace"));
+        let failure = plain(format!("`{text}` selects no choice in the trace"));
         Err(match nearest(text, known.iter().map(String::as_str)) {
-            Some(n) => trouble.hint(format!("did you mean `{n}`?")),
+            Some(n) => failure.hint(format!("did you mean `{n}`?")),
             None if known.is_empty() => {
-                trouble.hint("the trace has no choices yet: assume x ~ normal(0, 1)")
+                failure.hint("the trace has no choices yet: assume x ~ normal(0, 1)")
             }
-            None => trouble.hint("`:trace` shows all of them"),
+            None => failure.hint("`:trace` shows all of them"),
         })
     }
 
@@ -119,4 +120,56 @@ pub(super) fn addressed(text: &str) -> Cow<'_, str> {
     let name = text.split(['[', '/']).next().unwrap_or(text);
     let is_name = name.chars().all(|c| c.is_alphanumeric() || c == '_');
     if begins && is_name { Cow::Owned(format!("@{text}")) } else { Cow::Borrowed(text) }
+}
+
+impl Session {
+    /// `:why @a`.
+    pub(super) fn why(&mut self, text: &str) -> Result<Reply, Failure> {
+        let found = self.select(text)?;
+        let [(address, target)] = &found[..] else {
+            let first: Vec<String> = found.iter().take(3).map(|(a, _)| a.to_string()).collect();
+            let failure = plain(format!("`{text}` selects {} choices", found.len()));
+            return Err(failure.hint(format!("ask for one of them: {}, …", first.join(", "))));
+        };
+        let (value, score) =
+            (shown::short(&self.trace.value(*target)), number(self.trace.score_of(*target)));
+        let dist = self.trace.dist(*target).map_or_else(String::new, |d| d.name().to_owned());
+        let mut s = format!("{address} = {value}, drawn from {dist}, log density {score}\n");
+        let origins = self.trace.origins(*target);
+        if !origins.is_empty() {
+            let names: Vec<String> = origins.iter().take(ROWS).map(ToString::to_string).collect();
+            s += &format!("depends on {}\n{}", names.join(", "), more(origins.len(), "choices"));
+        }
+        let reach = self.trace.dependents(*target);
+        if !reach.names.is_empty() {
+            let names: Vec<&str> = reach.names.iter().map(|n| &**n).collect();
+            s += &format!("used by {}\n", names.join(", "));
+        }
+        if reach.terms.is_empty() {
+            s += "no observation or factor depends on it in this state\n";
+            return Ok(Reply::text(s));
+        }
+        let mut rows = vec![["depends on it", "", "log density", ""].map(str::to_owned).to_vec()];
+        for r in reach.terms.iter().take(ROWS) {
+            let what = match r.term {
+                Term::Choice => "choice",
+                Term::Observation => "observation",
+                Term::Factor => "factor",
+            };
+            let effect = match r.effect {
+                Effect::Scored => "",
+                Effect::Moved => "may move with it",
+                Effect::Structural => "may appear or vanish",
+            };
+            rows.push(vec![
+                r.address.to_string(),
+                what.into(),
+                number(r.log_density),
+                effect.into(),
+            ]);
+        }
+        s += &aligned(&rows);
+        s += &more(reach.terms.len(), "terms");
+        Ok(Reply::text(s))
+    }
 }

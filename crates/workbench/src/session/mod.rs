@@ -14,30 +14,27 @@ mod command;
 mod complete;
 mod draws;
 mod edit;
-mod export;
 mod files;
 mod layers;
 mod look;
 mod picture;
 mod plot;
 mod redefine;
-mod render;
 mod reply;
 mod run;
 mod shown;
 mod state;
-mod why;
 
+pub use crate::failure::Failure;
 pub use background::Status;
 pub use change::Scores;
 pub use choices::{ChoiceRow, Marks, to_json};
 pub use command::{COMMANDS, Command};
 pub use complete::Completion;
-pub use export::{exported, exported_operand};
+pub use files::{exported, exported_operand};
 pub use layers::{Layer, photo_contours};
-pub use picture::{Picture, detected, over};
-pub use render::observed_image;
-pub use reply::{Reply, Request, Trouble};
+pub use picture::{ViewPicture, detected, observed_image, over};
+pub use reply::{Reply, Request};
 pub use shown::short;
 pub use state::Session;
 
@@ -46,7 +43,7 @@ impl Session {
     ///
     /// # Errors
     /// If the entry has errors or was stopped; nothing has changed then.
-    pub fn enter(&mut self, text: &str) -> Result<Reply, Trouble> {
+    pub fn enter(&mut self, text: &str) -> Result<Reply, Failure> {
         self.clock += 1;
         self.dragged = None;
         let text = text.trim();
@@ -63,7 +60,7 @@ impl Session {
             },
         };
         match done {
-            Err(_) if self.limits.stop.is_asked() => Err(Trouble::Stopped),
+            Err(_) if self.limits.stop.is_asked() => Err(Failure::Interrupted),
             done => done,
         }
     }

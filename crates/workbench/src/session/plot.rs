@@ -1,7 +1,8 @@
 //! `:plot x`: a text plot of a quantity of the last inference.
 
-use super::reply::{Reply, Trouble};
+use super::reply::Reply;
 use super::state::Session;
+use crate::failure::{Failure, plain};
 use pcadlang_report::{Quantity, number, quantities};
 use pcadlang_syntax::diag::nearest;
 
@@ -17,18 +18,18 @@ const BELOW: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'
 
 impl Session {
     /// `:plot x`.
-    pub(super) fn plot(&self, name: &str) -> Result<Reply, Trouble> {
+    pub(super) fn plot(&self, name: &str) -> Result<Reply, Failure> {
         let (said, draws) = self.latest_draws()?;
         let all = quantities(&[draws]);
         if let Some(q) = all.iter().find(|q| q.name == name) {
             return Ok(Reply::text(said + &plotted(q)));
         }
         let names = all.iter().map(|q| q.name.as_str());
-        let trouble = Trouble::plain(format!("the last inference has no quantity `{name}`"));
+        let failure = plain(format!("the last inference has no quantity `{name}`"));
         Err(match nearest(name, names.clone()) {
-            Some(n) => trouble.hint(format!("did you mean `{n}`?")),
+            Some(n) => failure.hint(format!("did you mean `{n}`?")),
             None => {
-                trouble.hint(format!("it has {}", names.take(20).collect::<Vec<_>>().join(", ")))
+                failure.hint(format!("it has {}", names.take(20).collect::<Vec<_>>().join(", ")))
             }
         })
     }

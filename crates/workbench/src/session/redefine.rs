@@ -1,7 +1,7 @@
 //! The names that a program's items bind, for replacing items when a name is bound again,
 //! and for removing them.
 
-use super::reply::Trouble;
+use crate::failure::{Failure, plain};
 use pcadlang_syntax::ast::{Item, ItemKind, StmtKind};
 use pcadlang_syntax::diag::{SourceMap, nearest};
 use pcadlang_syntax::{Class, classes, parse, print_expr};
@@ -110,19 +110,19 @@ pub(super) fn forgotten(text: &str) -> Option<&str> {
 }
 
 /// Returns the key of a name to forget; the error suggests an existing name.
-pub(super) fn to_forget(text: &str, name: &str) -> Result<Key, Trouble> {
+pub(super) fn to_forget(text: &str, name: &str) -> Result<Key, Failure> {
     let all: Vec<Key> = items(text).into_iter().filter_map(|(k, _)| k).collect();
     // The last item is preferred, since it was typed last.
     if let Some(k) = all.iter().rev().find(|k| *k.1 == *name) {
         return Ok(k.clone());
     }
-    let trouble = Trouble::plain(format!("the program has no `{name}` to forget"));
+    let failure = plain(format!("the program has no `{name}` to forget"));
     Err(match nearest(name, all.iter().map(|k| &*k.1)) {
-        Some(n) => trouble.hint(format!("did you mean `{n}`?")),
+        Some(n) => failure.hint(format!("did you mean `{n}`?")),
         None if name.starts_with("obs#") => {
-            trouble.hint("an observation is forgotten by its name: observe … as name; or :edit")
+            failure.hint("an observation is forgotten by its name: observe … as name; or :edit")
         }
-        None => trouble.hint("`:list` shows the program"),
+        None => failure.hint("`:list` shows the program"),
     })
 }
 

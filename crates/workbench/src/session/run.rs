@@ -7,9 +7,10 @@
 
 use super::background::{Background, Finished};
 use super::draws::SampledDraws;
-use super::reply::{Reply, Trouble};
+use super::reply::Reply;
 use super::state::{INPUT, Session};
 use crate::bank::BankFiles;
+use crate::failure::{Failure, plain};
 use pcadlang_engine::lang::plan::Plan;
 use pcadlang_engine::trace::{Limits, Stop};
 use pcadlang_inference::{Progress, RunOptions, run_from};
@@ -39,16 +40,14 @@ struct Job {
 
 impl Session {
     /// `:infer [plan] [N] [&]`.
-    pub(super) fn infer(&mut self, text: &str) -> Result<Reply, Trouble> {
+    pub(super) fn infer(&mut self, text: &str) -> Result<Reply, Failure> {
         let (text, in_background) = match text.strip_suffix('&') {
             Some(rest) => (rest.trim(), true),
             None => (text, false),
         };
         let (plan, steps) = match text.rsplit_once(char::is_whitespace).unwrap_or(("", text)) {
             (plan, count) if count.bytes().all(|b| b.is_ascii_digit()) && !count.is_empty() => {
-                let n = count
-                    .parse()
-                    .map_err(|_| Trouble::plain(format!("{count} steps are too many")))?;
+                let n = count.parse().map_err(|_| plain(format!("{count} steps are too many")))?;
                 (plan.trim(), Some(n))
             }
             _ => (text, None),
@@ -58,12 +57,12 @@ impl Session {
     }
 
     /// Runs a typed inference block.
-    pub(super) fn infer_block(&mut self, block: &str) -> Result<Reply, Trouble> {
+    pub(super) fn infer_block(&mut self, block: &str) -> Result<Reply, Failure> {
         let job = self.typed(block, "infer { … }".to_owned(), None)?;
         self.launch(job, false)
     }
 
-    fn job(&self, plan: &str, steps: Option<u64>) -> Result<Job, Trouble> {
+    fn job(&self, plan: &str, steps: Option<u64>) -> Result<Job, Failure> {
         let model = Arc::clone(&self.model);
         if plan.is_empty() {
             let (plan, default) = model.plan()?;
@@ -91,23 +90,22 @@ impl Session {
     }
 
     /// Prepares the run of a block that is not part of the program.
-    fn typed(&self, block: &str, what: String, steps: Option<u64>) -> Result<Job, Trouble> {
+    fn typed(&self, block: &str, what: String, steps: Option<u64>) -> Result<Job, Failure> {
         let (plan, model) = self.compiled(block)?;
         Ok(Job { what, model, plan, steps, note: String::new() })
     }
 
-    fn compiled(&self, block: &str) -> Result<(Arc<Plan>, Arc<Model>), Trouble> {
+    fn compiled(&self, block: &str) -> Result<(Arc<Plan>, Arc<Model>), Failure> {
         let program: Program = self.program.and(INPUT, block)?;
         let model = program.compile()?;
-        let plan =
-            model.last_plan().ok_or_else(|| Trouble::plain("this is not an inference block"))?;
+        let plan = model.last_plan().ok_or_else(|| plain("this is not an inference block"))?;
         Ok((plan, Arc::new(model)))
     }
 
-    fn launch(&mut self, job: Job, in_background: bool) -> Result<Reply, Trouble> {
+    fn launch(&mut self, job: Job, in_background: bool) -> Result<Reply, Failure> {
         if let Some(b) = &self.background {
-            let trouble = Trouble::plain(format!("run {} is in the background", b.number));
-            return Err(trouble.hint("`:wait` for it, `:stop` it, or `:drop` it first"));
+            let failure = plain(format!("run {} is in the background", b.number));
+            return Err(failure.hint("`:wait` for it, `:stop` it, or `:drop` it first"));
         }
         let note = job.note.clone();
         let run = self.begin(job)?;
@@ -130,7 +128,7 @@ impl Session {
     }
 
     /// Starts a chain on a clone of the trace.
-    fn begin(&mut self, job: Job) -> Result<Background, Trouble> {
+    fn begin(&mut self, job: Job) -> Result<Background, Failure> {
         let mut trace = match Arc::ptr_eq(&job.model, &self.model) {
             true => self.trace.clone(),
             false => self.moved_to(&job.model, &self.trace)?,
@@ -164,8 +162,7 @@ impl Session {
                 result
             })
         };
-        let thread =
-            thread.map_err(|e| Trouble::plain(format!("no thread can be started: {e}")))?;
+        let thread = thread.map_err(|e| plain(format!("no thread can be started: {e}")))?;
         let base = Arc::clone(&self.model);
         let (what, model, steps, began) = (job.what, job.model, job.steps, Instant::now());
         Ok(Background {
@@ -186,11 +183,11 @@ impl Session {
     /// Waits until a run is over. If `stop` is requested meanwhile, `ends` tells whether
     /// that ends the run (and the wait continues until it has) or the wait, with an
     /// error. Returns true if the run was not cancelled.
-    fn wait_for(&mut self, run: &Background, stop: &Stop, ends: bool) -> Result<bool, Trouble> {
+    fn wait_for(&mut self, run: &Background, stop: &Stop, ends: bool) -> Result<bool, Failure> {
         while run.done.recv_timeout(PAUSE) == Err(RecvTimeoutError::Timeout) {
             if stop.is_asked() {
                 if !ends {
-                    return Err(Trouble::Stopped);
+                    return Err(Failure::Interrupted);
                 }
                 run.progress.cancelled.store(true, Ordering::Relaxed);
             }
@@ -202,8 +199,8 @@ impl Session {
     }
 
     /// Makes the last state of a finished run the state of the session.
-    fn adopt(&mut self, run: Background) -> Result<String, Trouble> {
-        let joined = run.thread.join().map_err(|_| Trouble::plain("the run ended unexpectedly"))?;
+    fn adopt(&mut self, run: Background) -> Result<String, Failure> {
+        let joined = run.thread.join().map_err(|_| plain("the run ended unexpectedly"))?;
         let result = joined.map_err(|e| run.model.chain_error(e))?;
         let finished = Finished {
             what: run.what,
@@ -217,10 +214,10 @@ impl Session {
         };
         if !Arc::ptr_eq(&run.base, &self.model) {
             self.last = Some(finished);
-            let trouble =
-                Trouble::plain(format!("the program has changed since run {} started", run.number));
+            let failure =
+                plain(format!("the program has changed since run {} started", run.number));
             return Err(
-                trouble.hint("its state cannot be used; `:plot` and `:profile` show what it did")
+                failure.hint("its state cannot be used; `:plot` and `:profile` show what it did")
             );
         }
         let mut last = result.last;
@@ -253,7 +250,7 @@ impl Session {
     }
 
     /// `:wait`.
-    pub(super) fn wait(&mut self) -> Result<Reply, Trouble> {
+    pub(super) fn wait(&mut self) -> Result<Reply, Failure> {
         let run = self.taken()?;
         let waited = self.wait_for(&run, &self.limits.stop.clone(), false);
         let said = run.line();
@@ -262,7 +259,7 @@ impl Session {
     }
 
     /// `:stop`.
-    pub(super) fn stop(&mut self) -> Result<Reply, Trouble> {
+    pub(super) fn stop(&mut self) -> Result<Reply, Failure> {
         let run = self.taken()?;
         run.progress.cancelled.store(true, Ordering::Relaxed);
         if let Err(e) = self.wait_for(&run, &self.limits.stop.clone(), false) {
@@ -274,16 +271,16 @@ impl Session {
     }
 
     /// `:drop`.
-    pub(super) fn drop_background(&mut self) -> Result<Reply, Trouble> {
+    pub(super) fn drop_background(&mut self) -> Result<Reply, Failure> {
         let run = self.taken()?;
         run.progress.cancelled.store(true, Ordering::Relaxed);
         Ok(Reply::text(format!("run {} was discarded\n", run.number)))
     }
 
-    fn taken(&mut self) -> Result<Background, Trouble> {
+    fn taken(&mut self) -> Result<Background, Failure> {
         self.background
             .take()
-            .ok_or_else(|| Trouble::plain("nothing runs in the background").hint(":infer &"))
+            .ok_or_else(|| plain("nothing runs in the background").hint(":infer &"))
     }
 
     /// Returns the number of the background run, and whether it is over, so that a front
@@ -297,22 +294,22 @@ impl Session {
     ///
     /// # Errors
     /// If there are no draws: nothing has run, or the run is still in warm-up.
-    pub(super) fn latest_draws(&self) -> Result<(String, ChainDraws), Trouble> {
+    pub(super) fn latest_draws(&self) -> Result<(String, ChainDraws), Failure> {
         match (&self.background, &self.last) {
             (Some(run), _) => match run.kept.draws() {
-                draws if draws.rows.is_empty() => Err(Trouble::plain(run.no_draws().trim_end())),
+                draws if draws.rows.is_empty() => Err(plain(run.no_draws().trim_end())),
                 draws if run.status().is_done => Ok((String::new(), draws)),
                 draws => Ok((format!("run {}: {}\n", run.number, run.status().part()), draws)),
             },
             (None, Some(last)) => Ok((String::new(), last.draws.clone())),
-            (None, None) => Err(Trouble::plain("nothing has run yet").hint(":infer")),
+            (None, None) => Err(plain("nothing has run yet").hint(":infer")),
         }
     }
 
     /// `:profile`.
-    pub(super) fn profile(&self) -> Result<Reply, Trouble> {
+    pub(super) fn profile(&self) -> Result<Reply, Failure> {
         let Some(last) = &self.last else {
-            return Err(Trouble::plain("nothing has run yet").hint(":infer"));
+            return Err(plain("nothing has run yet").hint(":infer"));
         };
         let mut text = last.line();
         let rate = (last.steps + last.warmup) as f64 / last.seconds;

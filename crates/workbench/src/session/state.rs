@@ -1,8 +1,9 @@
 //! The state of a session: program, model and trace, and the states for `:undo`.
 
 use super::background::{Background, Finished, Status};
-use super::reply::{Reply, Trouble};
+use super::reply::Reply;
 use crate::bank;
+use crate::failure::{Failure, plain};
 use pcadlang_engine::lang::code::{Eager, Observed};
 use pcadlang_engine::lang::reach::path_within;
 use pcadlang_engine::trace::{Address, Constraint, Draws, Limits, Stop, Trace};
@@ -71,7 +72,7 @@ impl Session {
     ///
     /// # Errors
     /// None are known.
-    pub fn new(seed: u64, stop: Stop) -> Result<Session, Trouble> {
+    pub fn new(seed: u64, stop: Stop) -> Result<Session, Failure> {
         Session::open(Program::named(NAME, "")?, seed, stop).map(|(s, _)| s)
     }
 
@@ -82,7 +83,7 @@ impl Session {
     /// # Errors
     /// If the program has errors. Missing data are not an error: the session is then one
     /// of the prior.
-    pub fn open(program: Program, seed: u64, stop: Stop) -> Result<(Session, Reply), Trouble> {
+    pub fn open(program: Program, seed: u64, stop: Stop) -> Result<(Session, Reply), Failure> {
         let limits = Limits { nodes: NODES, stop: stop.after(Duration::ZERO), ..Limits::default() };
         let missing = program.missing_data();
         let (program, note) = match &missing[..] {
@@ -135,11 +136,11 @@ impl Session {
     }
 
     /// Checks a file that an entry names.
-    pub(super) fn permit(&self, path: &str) -> Result<(), Trouble> {
+    pub(super) fn permit(&self, path: &str) -> Result<(), Failure> {
         let Some(folder) = &self.confined else { return Ok(()) };
         path_within(folder, path).map(|_| ()).map_err(|_| {
-            let trouble = Trouble::plain(format!("{path}: not a file of this folder"));
-            trouble.hint("only files below the current folder can be used here")
+            let failure = plain(format!("{path}: not a file of this folder"));
+            failure.hint("only files below the current folder can be used here")
         })
     }
 
@@ -197,7 +198,7 @@ impl Session {
         model: &Model,
         kept: &[(u64, Constraint)],
         observed: &Arc<Observed>,
-    ) -> Result<(Trace, String), Trouble> {
+    ) -> Result<(Trace, String), Failure> {
         let code = match observed.is_empty() {
             true => Arc::clone(model.code()),
             false => Arc::new(model.code().with_observed(Arc::clone(observed))),
@@ -230,7 +231,7 @@ impl Session {
                         }
                     }
                     Err(e) if e.is_recoverable() => failure = Some(e),
-                    Err(e) => return Err(Trouble::run(model, *e)),
+                    Err(e) => return Err(Failure::run(model, *e)),
                 }
             }
             if let Some(t) = impossible {
@@ -242,8 +243,8 @@ impl Session {
             }
         }
         match failure {
-            Some(e) => Err(Trouble::run(model, *e)),
-            None => Err(Trouble::plain("the log density is undefined")),
+            Some(e) => Err(Failure::run(model, *e)),
+            None => Err(plain("the log density is undefined")),
         }
     }
 
@@ -253,14 +254,14 @@ impl Session {
         model: &Model,
         trace: &mut Trace,
         known: usize,
-    ) -> Result<(), Trouble> {
+    ) -> Result<(), Failure> {
         let draws = Draws {
             key: StreamKey::new(self.seed, 0, Purpose::START),
             step: self.clock,
             substream: ATTEMPTS,
         };
         pcadlang_inference::force(model.code(), known, trace, draws)
-            .map_err(|e| Trouble::run(model, *e))
+            .map_err(|e| Failure::run(model, *e))
     }
 
     /// Records the present state for `:undo`; `what` describes the change that follows.
@@ -291,7 +292,7 @@ impl Session {
     }
 
     /// Restores a recorded state.
-    pub(super) fn go_back(&mut self, past: &UndoState) -> Result<(), Trouble> {
+    pub(super) fn go_back(&mut self, past: &UndoState) -> Result<(), Failure> {
         let (trace, _) = self.restart(&past.model, &past.choices, &past.observed)?;
         (self.program, self.model) = (Arc::clone(&past.program), Arc::clone(&past.model));
         self.trace = trace;
@@ -299,9 +300,9 @@ impl Session {
     }
 
     /// `:undo`.
-    pub(super) fn undo(&mut self) -> Result<Reply, Trouble> {
+    pub(super) fn undo(&mut self) -> Result<Reply, Failure> {
         let Some(past) = self.past.pop_back() else {
-            return Err(Trouble::plain("there is nothing to undo"));
+            return Err(plain("there is nothing to undo"));
         };
         match self.exchange(&past) {
             Ok(now) => self.undone.push(now),
@@ -314,9 +315,9 @@ impl Session {
     }
 
     /// `:redo`.
-    pub(super) fn redo(&mut self) -> Result<Reply, Trouble> {
+    pub(super) fn redo(&mut self) -> Result<Reply, Failure> {
         let Some(next) = self.undone.pop() else {
-            return Err(Trouble::plain("there is nothing to redo"));
+            return Err(plain("there is nothing to redo"));
         };
         match self.exchange(&next) {
             Ok(now) => self.push(now),
@@ -329,7 +330,7 @@ impl Session {
     }
 
     /// Switches to a recorded state, and returns the present one for the opposite step.
-    fn exchange(&mut self, other: &UndoState) -> Result<UndoState, Trouble> {
+    fn exchange(&mut self, other: &UndoState) -> Result<UndoState, Failure> {
         let now = self.remember(&other.what);
         self.go_back(other)?;
         Ok(now)

@@ -1,7 +1,7 @@
 //! Calls of built-ins, forms, named functions and function values, with their arguments
 //! matched and checked.
 
-use super::lowerer::{AddHint, Lowerer, Typed};
+use super::lowerer::{Lowerer, Typed};
 use super::scope::Meaning;
 use super::types::{accepts, shown};
 use crate::lang::builtins::data::Literal;

@@ -1,6 +1,6 @@
 //! Random choices: `x ~ d`, and `t[k] ~ d` with the container `t` of its elements.
 
-use super::lowerer::{AddHint, Lowerer, Typed};
+use super::lowerer::{Lowerer, Typed};
 use super::scope::{Meaning, ScopeKind};
 use crate::lang::builtins::Type;
 use crate::lang::code::{DistSpec, Op, Operand, Slot, Source, SourceKey};

@@ -1,7 +1,7 @@
 //! Expressions of inference blocks: each becomes a function of the program, whose
 //! parameters are the values that the plan supplies.
 
-use super::lowerer::{AddHint, Around, Lowerer, Lowering, Typed};
+use super::lowerer::{Around, Lowerer, Lowering, Typed};
 use super::scope::{Binding, Body, Meaning, Scope, ScopeKind};
 use crate::lang::builtins::{Builtin, PlanForm, Type};
 use crate::lang::code::{Block, BlockId, BlockKind, Op, Operand, Slot};

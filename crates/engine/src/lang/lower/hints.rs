@@ -4,36 +4,13 @@
 //! Only messages are produced here; nothing in this file decides whether a program is
 //! correct.
 
-use super::lowerer::{AddHint, Lowerer};
+use super::lowerer::Lowerer;
 use crate::lang::builtins::{Builtin, Kind};
 use pcadlang_syntax::ast::{Arg, ItemKind, Name, Stmt, StmtKind};
 use pcadlang_syntax::diag::{Diagnostic, nearest};
+use pcadlang_syntax::elsewhere::called_here;
 use pcadlang_syntax::span::Span;
 use std::sync::Arc;
-
-/// Names from other languages and libraries, and their equivalents here.
-const ELSEWHERE: [(&str, &str); 20] = [
-    ("ln", "log"),
-    ("length", "len"),
-    ("size", "len"),
-    ("gaussian", "normal"),
-    ("bernoulli", "flip"),
-    ("Normal", "normal"),
-    ("gauss", "normal"),
-    ("randn", "normal"),
-    ("rand", "uniform"),
-    ("power", "**"),
-    ("range", "a .. b"),
-    ("print", "predict"),
-    ("isnan", "is_missing"),
-    ("is_nan", "is_missing"),
-    ("isna", "is_missing"),
-    ("is_na", "is_missing"),
-    ("null", "an array, empty or not"),
-    ("None", "an array, empty or not"),
-    ("True", "true"),
-    ("False", "false"),
-];
 
 /// Diagnostics by which plans in other languages end, and what to do instead. A chain knows only
 /// its own draws.
@@ -75,8 +52,7 @@ impl Lowerer<'_> {
         let module = builtins.iter().find(|b| b.module == name);
         let module =
             module.map(|_| format!("add at the top: include \"std/{name}.pcad\" as {name};"));
-        let called =
-            ELSEWHERE.iter().find(|(n, _)| *n == name).map(|(_, here)| format!("write `{here}`"));
+        let called = called_here(name).map(|here| format!("write `{here}`"));
         let e = self.error(format!("unknown name `{name}`"), span, "not bound here");
         match elsewhere {
             Some(Elsewhere::Later(at)) => {

@@ -1,7 +1,7 @@
 //! The top level of a file: includes, parameters, data, functions, statements.
 
 use super::interface::inspect;
-use super::lowerer::{AddHint, Export, Lowerer, Pending, Report, Typed};
+use super::lowerer::{Export, Lowerer, Pending, Report, Typed};
 use super::scope::{Body, Meaning, Module, Namespace, Scope, ScopeKind};
 use super::types::{accepts, declared, shown};
 use crate::lang::builtins::Type;

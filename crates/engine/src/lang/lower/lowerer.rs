@@ -206,19 +206,3 @@ impl<'a> Lowerer<'a> {
         }
     }
 }
-
-/// Adds hints and labels to a diagnostic in place.
-pub(super) trait AddHint {
-    fn hint_also(&mut self, hint: impl Into<String>);
-    fn point_at(&mut self, span: Span, text: &str);
-}
-
-impl AddHint for Diagnostic {
-    fn hint_also(&mut self, hint: impl Into<String>) {
-        self.hints.push(hint.into());
-    }
-
-    fn point_at(&mut self, span: Span, text: &str) {
-        self.labels.push(pcadlang_syntax::diag::Label { span, text: text.into(), primary: false });
-    }
-}

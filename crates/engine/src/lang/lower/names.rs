@@ -1,6 +1,6 @@
 //! Looking up and binding names, and making sites.
 
-use super::lowerer::{AddHint, Lowerer, Typed};
+use super::lowerer::{Lowerer, Typed};
 use super::scope::{Binding, Body, Meaning, ScopeKind};
 use crate::lang::builtins::Type;
 use crate::lang::code::{Operand, Site, SiteSegment, SiteTag};

@@ -1,7 +1,7 @@
 //! Inference blocks, declared kernels, reports and exports: all checks, and their
 //! compilation to [plans](crate::lang::plan).
 
-use super::lowerer::{AddHint, Around, Lowerer};
+use super::lowerer::{Around, Lowerer};
 use super::types::shown;
 use crate::lang::builtins::{self, Builtin, KernelTraits, Kind, PlanForm, Type};
 use crate::lang::code::Operand;

@@ -1,6 +1,6 @@
 //! Selections of choices; the addresses and tags in them must occur in the program.
 
-use super::lowerer::{AddHint, Around, Lowerer};
+use super::lowerer::{Around, Lowerer};
 use crate::lang::plan::Selection;
 use pcadlang_syntax::ast::{Address, BinaryOp, Expr, ExprKind, SegmentName};
 use pcadlang_syntax::diag::nearest;

@@ -1,6 +1,6 @@
 //! Statements of the model.
 
-use super::lowerer::{AddHint, Lowerer, Typed};
+use super::lowerer::{Lowerer, Typed};
 use super::scope::{Meaning, Scope, ScopeKind};
 use super::types::shown;
 use crate::lang::builtins::Type;

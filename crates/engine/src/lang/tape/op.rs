@@ -7,7 +7,7 @@ use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Binary, Builtin, PreviousEvaluation, Reduction, times};
 use crate::lang::density;
 use crate::lang::value::Value;
-use pcadlang_numerics::dist::{Batch, Datum, Dist};
+use pcadlang_numerics::dist::{Batch, Datum, Dist, Rows};
 use pcadlang_numerics::num::simd::{sum_of_triples, vectorised_if_many};
 use pcadlang_numerics::num::{Column, ExactSum};
 use smallvec::SmallVec;
@@ -157,10 +157,13 @@ impl Op {
                 there
             }
             Op::Guard { form, value } => form.value(values).is_some_and(|now| now.same(value)),
-            Op::Density { batch, x, params, n, observed, out, .. } => match out {
-                Some(out) => batch.score_each(v, *x, params, *n, *out),
-                None => batch.score(v, *x, params, *n, sums.of(*observed)),
-            },
+            Op::Density { batch, x, params, n, observed, out, .. } => {
+                let rows = Rows { x: *x, params, n: *n };
+                match out {
+                    Some(out) => batch.score_each(v, rows, *out),
+                    None => batch.score(v, rows, sums.of(*observed)),
+                }
+            }
             Op::Score { dist, x, observed, out, last } => {
                 let (Some(dist), Some(x)) = (dist.value(values), x.value(values)) else {
                     return false;
@@ -248,9 +251,10 @@ impl Op {
             }
             Op::Guard { .. } => true,
             Op::Density { batch, x, params, n, observed, out, .. } => {
+                let rows = Rows { x: *x, params, n: *n };
                 match out {
-                    Some(out) => batch.vjp_each(v, g, *x, params, *n, *out),
-                    None => batch.vjp(v, g, *x, params, *n, weight(*observed)),
+                    Some(out) => batch.vjp_each(v, g, rows, *out),
+                    None => batch.vjp(v, g, rows, weight(*observed)),
                 }
                 true
             }
@@ -290,8 +294,8 @@ impl Op {
     /// `each` if they are separate; `None` if it added none.
     pub fn terms(&self, v: &[f64], each: &mut Vec<f64>) -> Option<ScoreTerms> {
         match self {
-            Op::Density { batch, x, n, out: None, .. } => {
-                batch.each(v, *x, *n, each);
+            Op::Density { batch, x, params, n, out: None, .. } => {
+                batch.each(v, Rows { x: *x, params, n: *n }, each);
                 match (x.step, &each[..]) {
                     (0, [one]) => Some(ScoreTerms::One(*one)),
                     _ => Some(ScoreTerms::Each),

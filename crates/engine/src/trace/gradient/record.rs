@@ -3,8 +3,8 @@
 //!
 //! The nodes that an update of the choices may reach are found by invalidation, as in an
 //! update, and recorded on the tape, operands first. Structure is held fixed: where it
-//! depends on something that moves, the tape has a guard that detects a change, or there
-//! is no tape at all. Nothing is evaluated, and the trace does not change.
+//! depends on something that moves, the tape has a guard that detects a change, or the
+//! tape is missing. Nothing is evaluated, and the trace does not change.
 
 use super::in_place::{Besides, Given, InPlace};
 use super::{Inputs, Reverse};

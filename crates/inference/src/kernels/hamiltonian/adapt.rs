@@ -1,7 +1,7 @@
 //! Warm-up of Hamiltonian kernels: dual averaging of the step size (Hoffman & Gelman
 //! 2014, section 3.2), and a diagonal metric from the variances over windows that double
 //! in length, as in Stan. Other than in Stan, the variances are not shrunk towards 1e-3,
-//! which is no small value where a scale is smaller; and other than in nutpie, forces do
+//! which is not small where a scale is smaller; and other than in nutpie, forces do
 //! not count (docs/measurements/speed.md says what both cost).
 
 use super::point::Point;

@@ -25,8 +25,13 @@ impl Flip {
     /// Returns the derivative of the log probability with respect to `p`, where it is
     /// finite.
     #[inline]
-    fn by_p(&self, x: bool) -> f64 {
+    fn slope(&self, x: bool) -> f64 {
         if x { 1.0 / self.p } else { -1.0 / (1.0 - self.p) }
+    }
+
+    /// Returns the probabilities of true and false.
+    fn probabilities(&self) -> (f64, f64) {
+        (self.p, 1.0 - self.p)
     }
 }
 
@@ -37,51 +42,6 @@ fn truth(x: &Datum) -> Option<bool> {
         Datum::Num(1.0) => Some(true),
         Datum::Num(0.0) => Some(false),
         _ => None,
-    }
-}
-
-/// Truth values count as 1 and 0.
-impl Member<1> for Flip {
-    #[inline]
-    fn log_density(&self, x: f64) -> f64 {
-        self.log_probability(x != 0.0)
-    }
-
-    #[inline]
-    fn slopes(&self, x: f64) -> (f64, [f64; 1]) {
-        (0.0, [self.by_p(x != 0.0)])
-    }
-}
-
-impl Distribution for Flip {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
-
-    fn support(&self) -> Support {
-        Support::Boolean
-    }
-
-    fn sample(&self, rng: &mut Stream) -> Datum {
-        Datum::Bool(rng.uniform() < self.p)
-    }
-
-    #[inline]
-    fn log_density(&self, x: &Datum) -> f64 {
-        truth(x).map_or(f64::NEG_INFINITY, |x| self.log_probability(x))
-    }
-
-    fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        let x = truth(x).filter(|x| self.log_probability(*x).is_finite())?;
-        Some(Gradient { x: Vec::new(), params: vec![self.by_p(x)] })
-    }
-
-    fn mean(&self) -> Option<f64> {
-        Some(self.p)
-    }
-
-    fn sd(&self) -> Option<f64> {
-        Some((self.p * (1.0 - self.p)).sqrt())
     }
 }
 
@@ -105,51 +65,64 @@ impl FlipLogit {
 
     /// Returns the derivative of the log probability with respect to the log odds.
     #[inline]
-    fn by_logit(&self, x: bool) -> f64 {
+    fn slope(&self, x: bool) -> f64 {
         if x { expit(-self.logit) } else { -expit(self.logit) }
     }
-}
 
-/// Truth values count as 1 and 0.
-impl Member<1> for FlipLogit {
-    #[inline]
-    fn log_density(&self, x: f64) -> f64 {
-        self.log_probability(x != 0.0)
-    }
-
-    #[inline]
-    fn slopes(&self, x: f64) -> (f64, [f64; 1]) {
-        (0.0, [self.by_logit(x != 0.0)])
+    /// Returns the probabilities of true and false.
+    fn probabilities(&self) -> (f64, f64) {
+        (expit(self.logit), expit(-self.logit))
     }
 }
 
-impl Distribution for FlipLogit {
-    fn name(&self) -> &'static str {
-        Self::NAME
-    }
+/// Implements the distribution of a truth value, which counts as 1 or 0 in batches.
+macro_rules! of_truth {
+    ($($Family:ident)*) => {$(
+        impl Member<1> for $Family {
+            #[inline]
+            fn log_density(&self, x: f64) -> f64 {
+                self.log_probability(x != 0.0)
+            }
 
-    fn support(&self) -> Support {
-        Support::Boolean
-    }
+            #[inline]
+            fn slopes(&self, x: f64) -> (f64, [f64; 1]) {
+                (0.0, [self.slope(x != 0.0)])
+            }
+        }
 
-    fn sample(&self, rng: &mut Stream) -> Datum {
-        Datum::Bool(rng.uniform() < expit(self.logit))
-    }
+        impl Distribution for $Family {
+            fn name(&self) -> &'static str {
+                Self::NAME
+            }
 
-    #[inline]
-    fn log_density(&self, x: &Datum) -> f64 {
-        truth(x).map_or(f64::NEG_INFINITY, |x| self.log_probability(x))
-    }
+            fn support(&self) -> Support {
+                Support::Boolean
+            }
 
-    fn gradient(&self, x: &Datum) -> Option<Gradient> {
-        Some(Gradient { x: Vec::new(), params: vec![self.by_logit(truth(x)?)] })
-    }
+            fn sample(&self, rng: &mut Stream) -> Datum {
+                Datum::Bool(rng.uniform() < self.probabilities().0)
+            }
 
-    fn mean(&self) -> Option<f64> {
-        Some(expit(self.logit))
-    }
+            #[inline]
+            fn log_density(&self, x: &Datum) -> f64 {
+                truth(x).map_or(f64::NEG_INFINITY, |x| self.log_probability(x))
+            }
 
-    fn sd(&self) -> Option<f64> {
-        Some((expit(self.logit) * expit(-self.logit)).sqrt())
-    }
+            fn gradient(&self, x: &Datum) -> Option<Gradient> {
+                let x = truth(x).filter(|x| self.log_probability(*x).is_finite())?;
+                Some(Gradient { x: Vec::new(), params: vec![self.slope(x)] })
+            }
+
+            fn mean(&self) -> Option<f64> {
+                Some(self.probabilities().0)
+            }
+
+            fn sd(&self) -> Option<f64> {
+                let (p, q) = self.probabilities();
+                Some((p * q).sqrt())
+            }
+        }
+    )*};
 }
+
+of_truth!(Flip FlipLogit);

@@ -2,7 +2,7 @@
 //! [`crate::dist::batch`].
 
 use crate::dist::batch::{Component, component};
-use crate::dist::{Batch, Categorical, Dist, Mixture};
+use crate::dist::{Batch, Categorical, Dist, Mixture, Rows};
 use crate::num::{Column, ExactSum};
 use smallvec::SmallVec;
 
@@ -101,67 +101,37 @@ impl Mixed {
 }
 
 impl Batch for Mixed {
-    fn score(
-        &mut self,
-        buffer: &[f64],
-        x: Column,
-        _params: &[Column],
-        n: usize,
-        sum: &mut ExactSum,
-    ) -> bool {
+    fn score(&mut self, buffer: &[f64], rows: Rows, sum: &mut ExactSum) -> bool {
         self.refresh(buffer)
-            && (0..n).all(|i| {
-                let x = x.get(buffer, i);
+            && (0..rows.n).all(|i| {
+                let x = rows.x.get(buffer, i);
                 sum.add(self.log_density(x));
                 !x.is_nan()
             })
     }
 
-    fn each(&self, buffer: &[f64], x: Column, n: usize, out: &mut Vec<f64>) {
-        out.extend((0..n).map(|i| self.log_density(x.get(buffer, i))));
+    fn each(&self, buffer: &[f64], rows: Rows, out: &mut Vec<f64>) {
+        out.extend((0..rows.n).map(|i| self.log_density(rows.x.get(buffer, i))));
     }
 
-    fn vjp(
-        &self,
-        buffer: &[f64],
-        by: &mut [f64],
-        x: Column,
-        _params: &[Column],
-        n: usize,
-        weight: f64,
-    ) {
-        (0..n).for_each(|i| self.vjp_one(buffer, by, x, i, weight));
+    fn vjp(&self, buffer: &[f64], by: &mut [f64], rows: Rows, weight: f64) {
+        (0..rows.n).for_each(|i| self.vjp_one(buffer, by, rows.x, i, weight));
     }
 
-    fn score_each(
-        &mut self,
-        buffer: &mut [f64],
-        x: Column,
-        _params: &[Column],
-        n: usize,
-        out: usize,
-    ) -> bool {
+    fn score_each(&mut self, buffer: &mut [f64], rows: Rows, out: usize) -> bool {
         self.refresh(buffer)
-            && (0..n).all(|i| {
-                let at = x.get(buffer, i);
+            && (0..rows.n).all(|i| {
+                let at = rows.x.get(buffer, i);
                 buffer[out + i] = self.log_density(at);
                 !at.is_nan()
             })
     }
 
-    fn vjp_each(
-        &self,
-        buffer: &[f64],
-        by: &mut [f64],
-        x: Column,
-        _params: &[Column],
-        n: usize,
-        out: usize,
-    ) {
-        for i in 0..n {
+    fn vjp_each(&self, buffer: &[f64], by: &mut [f64], rows: Rows, out: usize) {
+        for i in 0..rows.n {
             let weight = by[out + i];
             if weight != 0.0 {
-                self.vjp_one(buffer, by, x, i, weight);
+                self.vjp_one(buffer, by, rows.x, i, weight);
             }
         }
     }

@@ -46,9 +46,9 @@ fn many_at_once_are_as_one_at_a_time() {
             for shift in [0.0, 0.05, 0.05, 0.1] {
                 let v = fill(shift);
                 let (mut sum, mut expected) = (ExactSum::default(), ExactSum::default());
-                assert!(b.score(&v, x, &columns, n, &mut sum));
+                assert!(b.score(&v, Rows { x, params: &columns, n }, &mut sum));
                 let mut by = vec![0.0; v.len()];
-                b.vjp(&v, &mut by, x, &columns, n, 2.0);
+                b.vjp(&v, &mut by, Rows { x, params: &columns, n }, 2.0);
                 let mut slopes = vec![0.0; v.len()];
                 for (i, s) in seen.iter().enumerate() {
                     let datum = if family.starts_with("flip") {
@@ -75,7 +75,10 @@ fn many_at_once_are_as_one_at_a_time() {
             } else {
                 -9.0
             });
-            assert!(!b.score(&v, x, &columns, n, &mut ExactSum::default()), "{family}");
+            assert!(
+                !b.score(&v, Rows { x, params: &columns, n }, &mut ExactSum::default()),
+                "{family}"
+            );
         }
     }
 }

@@ -22,7 +22,7 @@ const MOST_PIECES: usize = 1 << 19;
 /// more are drawn in full.
 const MOST_PIXELS: usize = 1 << 23;
 
-/// A mesh that has not moved in so many drawings counts as stationary again, if most
+/// A mesh that has not moved in that many drawings counts as stationary again, if most
 /// meshes count as moving.
 const PATIENCE: u64 = 1024;
 

@@ -28,7 +28,7 @@ impl View {
     }
 
     /// The same of the sum of `gain` times the fraction of each pixel that shows the solid,
-    /// [`View::fractions`], which is no step function.
+    /// [`View::fractions`], which is not a step function.
     pub fn vjp_fractions(&self, size: u32, gain: &[f64]) -> Vec<DVec3> {
         let camera = self.camera().scaled_to(size);
         if let Some(by_vertex) = self.covered(size).vjp(self.solid(), &camera, gain) {

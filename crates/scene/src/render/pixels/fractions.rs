@@ -107,7 +107,7 @@ impl Edge {
         Edge { from, to, slope: (to[0] - from[0]) / (to[1] - from[1]) }
     }
 
-    /// The rows that it crosses, of so many.
+    /// The rows that it crosses, of that many.
     #[inline(always)]
     pub fn rows(&self, most: usize) -> Range<usize> {
         first(self.from[1], most)..first(self.to[1], most)

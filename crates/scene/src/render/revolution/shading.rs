@@ -113,7 +113,7 @@ impl Shading {
         }
     }
 
-    /// Sets the unit normals of four points in the camera's coordinates, towards the eye, and
+    /// Sets the unit normals of four points in the camera's coordinates, towards the camera, and
     /// returns which of them are known; the others are 0.
     #[inline(always)]
     fn normals(
@@ -154,7 +154,7 @@ impl Shading {
 /// Squared lengths below this count as 0.
 const TINY: f32 = 1e-30;
 
-/// Turns some normals to the eye, as they have no direction.
+/// Turns some normals to the camera, as they have no direction.
 #[inline(never)]
 fn face(normal: &mut [[f32; 3]; LANES], which: u32, sight: &Sight, [u, v, w]: [&Row; 3]) {
     for (i, normal) in normal.iter_mut().enumerate().filter(|(i, _)| which >> i & 1 != 0) {

@@ -1,8 +1,8 @@
 //! Full-text search for built-ins.
 
-use crate::lang::builtins::finding::aliases::ALIASES;
 use crate::lang::builtins::{Builtin, Table};
 use pcadlang_syntax::diag::nearest;
+use pcadlang_syntax::elsewhere::FOREIGN_NAMES;
 
 /// The result of a search.
 #[derive(Debug)]
@@ -65,10 +65,12 @@ struct Text<'t> {
 impl<'t> Text<'t> {
     fn new(of: &'t Builtin) -> Self {
         let args = of.args.iter().flat_map(|arg| words_of(&arg.name).chain(words_of(&arg.doc)));
-        let known = ALIASES.iter().find(|(name, _)| of.module.is_empty() && *name == of.name);
+        let known =
+            FOREIGN_NAMES.iter().find(|(name, ..)| of.module.is_empty() && *name == of.name);
         let aliases = known
             .into_iter()
-            .flat_map(|(_, words)| words_of(words).chain(words.split(' ').map(str::to_owned)));
+            .flat_map(|(_, names, words)| [names, words])
+            .flat_map(|words| words_of(words).chain(words.split(' ').map(str::to_owned)));
         Text {
             of,
             name: of.name.to_lowercase(),

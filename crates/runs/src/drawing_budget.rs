@@ -1,29 +1,29 @@
-//! How often the states of a run may be drawn beside its chains, without slowing them down.
+//! Limits how often the states of a run are drawn, so that drawing does not slow its chains.
 
 use crate::job::machine_threads;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// The least time between two states.
+/// Minimum time between two states.
 const BETWEEN: Duration = Duration::from_millis(200);
-/// The longest time between two states.
+/// Maximum time between two states.
 const MOST: Duration = Duration::from_secs(2);
-/// The part of the machine that may go to them.
+/// Maximum fraction of the machine's threads for drawing.
 const SHARE: f64 = 0.025;
-/// The number of states whose times are remembered.
+/// The number of recent states whose times are kept.
 const REMEMBERED: usize = 8;
 
-/// An account of what drawing costs.
+/// The time that recent states took to draw, and when the next one may be drawn.
 #[derive(Debug, Default)]
-pub struct Ration {
+pub struct DrawingBudget {
     next: Option<Instant>,
-    /// How long the last states took. The least of these times is near to what one costs:
-    /// beside chains that use the whole machine, drawing takes longer than that.
+    /// The times of the last states. Their minimum estimates the cost of one: chains that use
+    /// the whole machine delay most of them.
     took: VecDeque<Duration>,
 }
 
-impl Ration {
-    /// Notes how long the last state took.
+impl DrawingBudget {
+    /// Records the time that the last state took.
     pub fn took(&mut self, time: Duration) {
         self.took.push_back(time);
         if self.took.len() > REMEMBERED {
@@ -46,12 +46,12 @@ mod tests {
 
     #[test]
     fn what_costs_more_comes_less_often() {
-        let mut r = Ration::default();
+        let mut r = DrawingBudget::default();
         assert_eq!(r.rest(), Duration::ZERO);
-        let near = |r: &Ration, t: Duration| t - r.rest() < Duration::from_millis(50);
+        let near = |r: &DrawingBudget, t: Duration| t - r.rest() < Duration::from_millis(50);
         r.took(Duration::from_micros(10));
         assert!(near(&r, BETWEEN));
-        let mut r = Ration::default();
+        let mut r = DrawingBudget::default();
         r.took(Duration::from_secs(100));
         assert!(near(&r, MOST));
         // One that was held up does not count.

@@ -24,14 +24,14 @@ pub(super) struct Comment<'s> {
     /// The comment with its delimiters.
     pub text: &'s str,
     pub place: Place,
-    /// Whether an empty line precedes it.
+    /// True if an empty line precedes it.
     pub blank: bool,
     pub seen: SourcePlace,
 }
 
 /// A text, its tokens, and the position of the next one.
 #[derive(Debug)]
-pub(super) struct Source<'s> {
+pub(super) struct TokenCursor<'s> {
     text: &'s str,
     tokens: Vec<Range<usize>>,
     /// The byte at which each line starts.
@@ -39,18 +39,18 @@ pub(super) struct Source<'s> {
     next: usize,
     /// The comments before the next token that have not been taken.
     comments: Vec<Comment<'s>>,
-    /// Whether an empty line directly precedes the next token.
+    /// True if an empty line directly precedes the next token.
     blank: bool,
 }
 
-impl<'s> Source<'s> {
+impl<'s> TokenCursor<'s> {
     pub fn new(text: &'s str) -> Self {
         let (lexemes, _) = lex(text, 0..text.len(), FileId(0), 0);
         let tokens = lexemes.into_iter().map(|lexeme| lexeme.start..lexeme.end).collect();
         let lines =
             std::iter::once(0).chain(text.match_indices('\n').map(|(i, _)| i + 1)).collect();
         let mut source =
-            Source { text, tokens, lines, next: 0, comments: Vec::new(), blank: false };
+            TokenCursor { text, tokens, lines, next: 0, comments: Vec::new(), blank: false };
         source.read_gap();
         source
     }

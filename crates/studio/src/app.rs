@@ -1,11 +1,9 @@
 //! Does what the page asks: every method of the protocol, by the sessions of the prompt and
 //! the runs of `pcadlang run`.
 
-use super::answer::Answer;
 use super::folder::Folder;
-use super::layout::{self, finite};
-use super::protocol::{self, Call, StateName};
-use super::results;
+use super::protocol::{self, Answer, Call, StateName};
+use super::results::{self, finite};
 use super::runs::Runs;
 use super::sessions::{OpenSession, Sessions, job_of};
 use super::states::{no_view, picture};
@@ -27,11 +25,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use tokio::sync::broadcast;
 
-/// The most choices in one answer.
+/// Maximum choices in one answer.
 const CHOICES: usize = 2000;
 
-/// What the tabs of all browsers share.
-pub struct Desk {
+/// The state that the tabs of all browsers share.
+pub struct App {
     /// The opened folder.
     pub folder: Folder,
     /// The open sessions.
@@ -42,7 +40,7 @@ pub struct Desk {
     pub events: broadcast::Sender<String>,
 }
 
-impl Desk {
+impl App {
     /// Does what is asked, which may take as long as the program does.
     pub fn answer(&self, call: Call) -> Result<Answer, Failure> {
         let json = match call {
@@ -111,7 +109,7 @@ impl Desk {
             Call::Compare(c) => results::compared(&*self.runs.get(&c.a)?, &*self.runs.get(&c.b)?)?,
             Call::Export(e) => {
                 let run = self.runs.get(&e.run)?;
-                let file = super::exports::export(&run, &e.kind)?;
+                let file = super::results::export(&run, &e.kind)?;
                 json!({ "file": format!("{}/{file}", run.name) })
             }
             Call::Picture(p) => return self.picture(p),
@@ -312,7 +310,7 @@ impl Desk {
     fn mesh(&self, m: &protocol::Mesh) -> Result<Answer, Failure> {
         let limit = m.limit;
         let (header, data) = self.with_view(&m.state, move |view, log_joint| {
-            let (mut header, data) = layout::mesh(view.solid(), limit).map_err(plain)?;
+            let (mut header, data) = results::mesh(view.solid(), limit).map_err(plain)?;
             header.insert("log_joint".into(), finite(log_joint));
             Ok((header, data))
         })?;
