@@ -6,7 +6,7 @@ import { ErrorBox } from "./errors";
 import { Latest } from "./latest";
 import { figure, PictureView } from "./picture_view";
 import { hasBest, runName, type Comparison, type Statistics } from "./protocol";
-import { SocketSource } from "./socket_source";
+import { StudioData } from "./studio_data";
 
 /** Two runs: pictures in the same layer, settings, quantities. */
 export class ComparePanel {
@@ -83,7 +83,7 @@ export class ComparePanel {
 
   private showPicture(view: PictureView, run: string): void {
     const known = { ...this.actions.store.now, view: "best" as const, run };
-    view.setSource(new SocketSource(this.actions.connection, known));
+    view.setData(new StudioData(this.actions.connection, known));
   }
 
   private async read(): Promise<void> {

@@ -5,7 +5,7 @@ import { fill, h, number } from "./dom";
 import { ErrorBox } from "./errors";
 import { Latest } from "./latest";
 import { isLive, type Mode, type Summary } from "./protocol";
-import { askPicture } from "./socket_source";
+import { askPicture } from "./studio_data";
 
 /** Modes as cards; a click shows one in the viewer. */
 export class ModesPanel {

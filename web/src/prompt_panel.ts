@@ -4,7 +4,7 @@ import type { Actions } from "./actions";
 import { button, h } from "./dom";
 import { explain } from "./errors";
 import { Latest } from "./latest";
-import { askPicture } from "./socket_source";
+import { askPicture } from "./studio_data";
 
 interface Completion {
   from: number;

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { deflateSync } from "node:zlib";
-import { inflate, readCorners, readPositions } from "../src/embedded_source";
+import { inflate, readCorners, readPositions } from "../src/embedded_data";
 
 test("positions return from their differences, within a step of the grid", async () => {
   const low = [-1, 0, 2];

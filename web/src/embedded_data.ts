@@ -1,7 +1,7 @@
 // What a report's viewer shows: draws and pictures that lie in the page as JSON.
 
 import type { Camera, Mesh } from "./protocol";
-import type { Frame, Picture, Source } from "./source";
+import type { Frame, ImageUrl, ViewerData } from "./viewer_data";
 
 /** A draw as the report holds it. */
 export interface EmbeddedDraw {
@@ -56,7 +56,7 @@ export function readCorners(bytes: Uint8Array): Uint32Array {
 }
 
 /** The draws and pictures of a report. */
-export class EmbeddedSource implements Source {
+export class EmbeddedData implements ViewerData {
   readonly key = "report";
   readonly frames: Frame[];
   readonly layers: string[];
@@ -92,15 +92,15 @@ export class EmbeddedSource implements Source {
     return this.scene.camera;
   }
 
-  async photo(): Promise<Picture | null> {
+  async photo(): Promise<ImageUrl | null> {
     const url = this.scene.photo;
-    return url ? { url, owned: false, logJoint: null } : null;
+    return url ? { url, owned: false } : null;
   }
 
-  async picture(_frame: number, layer: string): Promise<Picture> {
+  async picture(_frame: number, layer: string): Promise<ImageUrl> {
     const url = this.scene.layers[layer];
     if (!url) throw new Error(`the report has no picture \`${layer}\``);
-    return { url, owned: false, logJoint: null };
+    return { url, owned: false };
   }
 
   private async readMesh(frame: number): Promise<Mesh> {
