@@ -5,7 +5,7 @@
 import { cellTokens, COLOURS } from "./cell_colours";
 import { streamMode, type Kind } from "./tokens";
 
-/** What the page of a notebook may have, the classic one with CodeMirror 5 included. */
+/** The parts of a notebook's page that may exist; the classic one has CodeMirror 5. */
 interface Page {
   pcadCells?: boolean;
   CodeMirror?: { defineMode(name: string, make: () => object): void };

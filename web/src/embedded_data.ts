@@ -1,10 +1,10 @@
-// What a report's viewer shows: draws and pictures that lie in the page as JSON.
+// The data of a report's viewer: draws and pictures that lie in the page as JSON.
 
 import type { Camera, Mesh } from "./protocol";
 import type { Frame, ImageUrl, ViewerData } from "./viewer_data";
 
 /** A draw as the report holds it. */
-export interface EmbeddedDraw {
+interface EmbeddedDraw {
   chain: number | null;
   draw: number | null;
   log_joint: number | null;
@@ -25,14 +25,14 @@ export interface EmbeddedScene {
 }
 
 /** The bytes behind base64 text of a zlib stream. */
-export async function inflate(text: string): Promise<Uint8Array> {
+async function inflate(text: string): Promise<Uint8Array> {
   const packed = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
 /** Positions from their differences: all x, then all y, then all z, of 16 bits each. */
-export function readPositions(bytes: Uint8Array, low: number[], high: number[]): Float32Array {
+function readPositions(bytes: Uint8Array, low: number[], high: number[]): Float32Array {
   const data = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const n = Math.floor(bytes.byteLength / 6);
   const positions = new Float32Array(3 * n);
@@ -49,7 +49,7 @@ export function readPositions(bytes: Uint8Array, low: number[], high: number[]):
 }
 
 /** The corners of triangles, of 32 bits each. */
-export function readCorners(bytes: Uint8Array): Uint32Array {
+function readCorners(bytes: Uint8Array): Uint32Array {
   const data = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const count = Math.floor(bytes.byteLength / 4);
   return Uint32Array.from({ length: count }, (_, i) => data.getUint32(4 * i, true));

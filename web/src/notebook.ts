@@ -7,6 +7,8 @@ import { standaloneViewer } from "./standalone";
 function render({ model, el }: { model: WidgetModel; el: HTMLElement }): () => void {
   const place = document.createElement("div");
   place.style.cssText = "max-width: 560px; height: 400px";
+  // Keys that work the viewer are not also Jupyter's.
+  place.setAttribute("data-lm-suppress-shortcuts", "true");
   el.append(place);
   const viewer = standaloneViewer(place);
   viewer.setData(new NotebookData(model, viewer.has3D));

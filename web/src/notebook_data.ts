@@ -1,4 +1,4 @@
-// What the viewer of a notebook shows: one solid, whose bytes the kernel sends.
+// The data of a notebook's viewer: one solid, whose bytes the kernel sends.
 
 import type { Camera, Mesh } from "./protocol";
 import type { Frame, ImageUrl, ViewerData } from "./viewer_data";

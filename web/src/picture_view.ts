@@ -1,7 +1,7 @@
 // The picture of a frame in one of its layers, with the viewpoint it is rendered from.
 
 import { Disconnected } from "./connection";
-import { append, h, select, setOptions } from "./dom";
+import { h, select, setOptions } from "./dom";
 import { ErrorBox } from "./errors";
 import { Latest } from "./latest";
 import type { Camera, Vec3 } from "./protocol";
@@ -198,11 +198,4 @@ function middle(positions: Float32Array): Vec3 {
 
 function fovOfHeight(height: number, distance: number): number {
   return (2 * Math.atan(height / 2 / Math.max(distance, 1e-6)) * 180) / Math.PI;
-}
-
-/** A picture with a caption, for galleries and comparisons. */
-export function figure(view: PictureView, caption: string): HTMLElement {
-  const element = h("figure");
-  append(element, view.element, h("figcaption", {}, caption));
-  return element;
 }

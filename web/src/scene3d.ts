@@ -59,6 +59,7 @@ export class Scene3D {
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", "3D view; arrow keys turn it, plus and minus zoom");
     canvas.addEventListener("keydown", (event) => this.key(event));
+    canvas.addEventListener("dblclick", () => this.reset());
     container.append(canvas);
     this.light.position.set(1.5, 2.5, 3);
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8a8f98, 1.3), this.light);
@@ -253,6 +254,7 @@ export class Scene3D {
     const step = steps[event.key];
     if (!step || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
+    event.stopPropagation();
     const away = this.camera.position.clone().sub(this.controls.target);
     const polar = new THREE.Spherical().setFromVector3(away);
     polar.theta += step[0];

@@ -2,14 +2,12 @@
 
 import * as THREE from "three";
 import { partColour, viridis, type Rgb } from "./colour_map";
-import { creasedNormals } from "./creases";
 import type { Mesh } from "./protocol";
 
-/** What a mesh's colours say. */
+/** The meaning of a mesh's colours. */
 export type Paint = "plain" | "parts" | "uncertainty";
 
-/** The geometry of a mesh; the paint `parts`, and normals that the mesh lacks, give every
- * triangle its own vertices. */
+/** The geometry of a mesh; the paint `parts` gives every triangle its own vertices. */
 export function meshGeometry(
   mesh: Mesh,
   paint: Paint,
@@ -21,12 +19,13 @@ export function meshGeometry(
     const { values, top } = deviations;
     paintVertices(geometry, (vertex) => viridis(values[vertex]! / top));
   }
+  // Meshes have their vertices twice along sharp edges, which so stay sharp.
   if (mesh.normals) geometry.setAttribute("normal", new THREE.BufferAttribute(mesh.normals, 3));
-  if (!mesh.normals || partOf) geometry = geometry.toNonIndexed();
-  if (!mesh.normals) {
-    geometry.setAttribute("normal", new THREE.BufferAttribute(creasedNormals(mesh), 3));
+  else geometry.computeVertexNormals();
+  if (partOf) {
+    geometry = geometry.toNonIndexed();
+    paintVertices(geometry, (corner) => partColour(partOf[Math.floor(corner / 3)]!));
   }
-  if (partOf) paintVertices(geometry, (corner) => partColour(partOf[Math.floor(corner / 3)]!));
   geometry.computeBoundingSphere();
   return geometry;
 }

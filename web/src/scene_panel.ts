@@ -89,7 +89,7 @@ export class ScenePanel {
     this.showNote();
     if (!known.connected) return;
     const data = new StudioData(connection, known);
-    // What is shown is asked for again only when it changed, not whenever anything is known.
+    // Pictures are asked for again only when the state changed, not whenever anything is known.
     const revision = known.view === "session" ? known.session?.revision : run?.revision;
     const moving = known.view === "session" || known.view === "best";
     const shown = JSON.stringify([
@@ -113,7 +113,7 @@ export class ScenePanel {
 
   private showNote(): void {
     const { session, view } = this.actions.store.now;
-    // What a session says when it is opened; its log joint is shown elsewhere.
+    // The session's note from when it was opened; its log joint is shown elsewhere.
     const lines = (session?.note ?? "").split("\n").filter((line) => !/^log joint/.test(line));
     const note = view === "session" ? lines.join("\n").trim().replace(/^note: /, "") : "";
     this.note.textContent = note;

@@ -1,4 +1,4 @@
-// What the studio's viewer shows: states of the session or of the run that is looked at.
+// The data of the studio's viewer: states of the session or of the run that is looked at.
 
 import type { Connection } from "./connection";
 import { readMesh, type Camera, type Mesh, type State } from "./protocol";

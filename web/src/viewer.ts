@@ -201,7 +201,7 @@ export class Viewer {
     space.hidden = layout === "picture";
     const { clientWidth, clientHeight } = this.panes;
     this.panes.classList.toggle("side-by-side", clientWidth > 1.1 * clientHeight);
-    // What is out of sight asks for nothing, a viewer that is not yet in its page included.
+    // A hidden view asks for nothing, nor does a viewer that is not yet in its page.
     const arranged = `${layout} ${clientWidth > 0}`;
     if (arranged === this.arranged) return;
     this.arranged = arranged;
