@@ -56,6 +56,7 @@ await mkdir(dist, { recursive: true });
 const bundles = [
   { format: "esm", entryPoints: { studio: "src/main.ts" }, outdir: dist },
   { ...alone, format: "iife", entryPoints: { report: "src/report.ts" }, outdir: dist },
+  { ...alone, format: "iife", entryPoints: { plots: "src/report_plots.ts" }, outdir: dist },
   { ...alone, format: "esm", entryPoints: { widget: "src/notebook.ts" }, outdir: notebook },
   { ...alone, format: "iife", entryPoints: { cells: "src/cells.ts" }, outdir: notebook },
 ];

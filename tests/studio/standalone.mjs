@@ -83,6 +83,9 @@ export async function standalone({ open, step, out, program, viewer }) {
     await settled(page, SPACE);
     checkChanged(before, await pixels(page, SPACE), "the draw");
     await page.screenshot({ path: join(out, "report.png") });
+    const names = await page.locator(".plots").count();
+    const plots = await page.locator(".plots .plot canvas").count();
+    check(names > 0 && plots === 3 * names, `${plots} plots of ${names} quantities`);
     return note;
   });
 

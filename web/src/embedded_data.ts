@@ -1,5 +1,6 @@
 // The data of a report's viewer: draws and pictures that lie in the page as JSON.
 
+import { inflate } from "./inflate";
 import type { Camera, Mesh } from "./protocol";
 import type { Frame, ImageUrl, ViewerData } from "./viewer_data";
 
@@ -22,13 +23,6 @@ export interface EmbeddedScene {
   high: number[];
   draws: EmbeddedDraw[];
   layers: Record<string, string>;
-}
-
-/** The bytes behind base64 text of a zlib stream. */
-async function inflate(text: string): Promise<Uint8Array> {
-  const packed = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
 /** Positions from their differences: all x, then all y, then all z, of 16 bits each. */

@@ -4,6 +4,7 @@ import type { Actions } from "./actions";
 import { fill, h, Segments } from "./dom";
 import { Panel } from "./panel";
 import { interval, type Interval } from "./plot_data";
+import { densityPlot } from "./plot_density";
 import { forestPlot } from "./plot_forest";
 import { MOST_PAIRS, pairsPlot } from "./plot_pairs";
 import { rankPlot } from "./plot_rank";
@@ -13,10 +14,14 @@ import { QuantityList } from "./quantity_list";
 
 const KINDS: [string, string][] = [
   ["trace", "Traces"],
+  ["density", "Densities"],
   ["rank", "Ranks"],
   ["pairs", "Pairs"],
   ["forest", "Intervals"],
 ];
+// Plots of one quantity each.
+type Plot = (quantity: Quantity, width: number, every: number) => HTMLElement;
+const SINGLE: Record<string, Plot> = { trace: tracePlot, density: densityPlot, rank: rankPlot };
 const MOST_PLOTS = 40;
 const WAIT = 3000;
 
@@ -106,10 +111,14 @@ export class PlotsPanel extends Panel {
       return;
     }
     const kind = this.kinds.value;
-    if (kind === "trace") {
-      fill(this.plots, ...quantities.map((q) => tracePlot(q, data.every, width)));
-    } else if (kind === "rank") {
-      fill(this.plots, ...quantities.map((q) => rankPlot(q, width)));
+    const single = SINGLE[kind];
+    if (single) {
+      const named = (q: Quantity) => {
+        const plot = single(q, width, data.every);
+        plot.prepend(h("figcaption", {}, h("code", {}, q.name)));
+        return plot;
+      };
+      fill(this.plots, ...quantities.map(named));
     } else if (kind === "pairs") {
       const note = `The first ${MOST_PAIRS} of ${quantities.length} chosen quantities.`;
       const more = quantities.length > MOST_PAIRS ? h("p", { class: "muted" }, note) : null;

@@ -4,6 +4,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { deflateSync } from "node:zlib";
+import { readQuantities } from "../src/embedded_draws";
 import { EmbeddedData, type EmbeddedScene } from "../src/embedded_data";
 import { NotebookData } from "../src/notebook_data";
 import type { Camera, Mesh, Run, Session, State } from "../src/protocol";
@@ -134,6 +135,23 @@ test("a report's draws are told apart, and its pictures lie in the page", async 
   assert.deepEqual(data.layers, ["overlay"]);
   assert.equal((await data.picture(0, "overlay")).url, "data:image/png;base64,AA==");
   await assert.rejects(data.picture(0, "depth"), /no picture `depth`/);
+});
+
+test("a report's draws return from their steps", async () => {
+  const chains = [packed(Uint16Array.of(0, 65535, 65534)), packed(Uint16Array.of(32767))];
+  const none = { name: "none", low: null, high: null, chains: [packed(Uint16Array.of(65535))] };
+  const most = Number.MAX_VALUE;
+  const [x, y, far] = await readQuantities({
+    every: 1,
+    quantities: [
+      { name: "x", low: -1, high: 3, chains },
+      none,
+      { name: "far", low: -most, high: most, chains },
+    ],
+  });
+  assert.deepEqual(x, { name: "x", chains: [[-1, null, 3], [1]] });
+  assert.deepEqual(y!.chains, [[null]]);
+  assert.deepEqual(far!.chains, [[-most, null, most], [0]]);
 });
 
 test("the studio asks for the state of the chosen view", async () => {
