@@ -8,7 +8,6 @@ export interface EmbeddedDraws {
   /** The draws of a chain are so many iterations apart. */
   every: number;
   quantities: {
-    name: string;
     /** The least and the largest draw; null: no draw is finite. */
     low: number | null;
     high: number | null;
@@ -19,10 +18,13 @@ export interface EmbeddedDraws {
 
 const NOT_FINITE = 65535;
 
-/** Draws from their steps between the bounds. */
-export async function readQuantities({ quantities }: EmbeddedDraws): Promise<Quantity[]> {
+/** Draws from their steps between the bounds; the page has the names. */
+export async function readQuantities(
+  { quantities }: EmbeddedDraws,
+  names: string[],
+): Promise<Quantity[]> {
   return Promise.all(
-    quantities.map(async ({ name, low, high, chains }) => {
+    quantities.map(async ({ low, high, chains }, i) => {
       const draw = (step: number) => {
         if (step === NOT_FINITE || low === null || high === null) return null;
         const share = step / (NOT_FINITE - 1);
@@ -31,9 +33,9 @@ export async function readQuantities({ quantities }: EmbeddedDraws): Promise<Qua
       const read = async (text: string) => {
         const bytes = await inflate(text);
         const data = new DataView(bytes.buffer);
-        return Array.from({ length: bytes.length / 2 }, (_, i) => draw(data.getUint16(2 * i, true)));
+        return Array.from({ length: bytes.length / 2 }, (_, k) => draw(data.getUint16(2 * k, true)));
       };
-      return { name, chains: await Promise.all(chains.map(read)) };
+      return { name: names[i] ?? "", chains: await Promise.all(chains.map(read)) };
     }),
   );
 }

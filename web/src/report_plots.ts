@@ -16,7 +16,7 @@ async function start(): Promise<void> {
   const places = [...document.querySelectorAll<HTMLElement>(".plots")];
   if (!text || places.length === 0) return;
   const data = JSON.parse(text) as EmbeddedDraws;
-  const quantities = await readQuantities(data);
+  const quantities = await readQuantities(data, places.map((p) => p.textContent ?? ""));
   document.head.append(h("style", {}, `${themed(".plots")}\n${uplot}\n.plots { ${plotStyle} }`));
   let width = 0;
   const draw = () => {

@@ -139,16 +139,10 @@ test("a report's draws are told apart, and its pictures lie in the page", async 
 
 test("a report's draws return from their steps", async () => {
   const chains = [packed(Uint16Array.of(0, 65535, 65534)), packed(Uint16Array.of(32767))];
-  const none = { name: "none", low: null, high: null, chains: [packed(Uint16Array.of(65535))] };
+  const none = { low: null, high: null, chains: [packed(Uint16Array.of(65535))] };
   const most = Number.MAX_VALUE;
-  const [x, y, far] = await readQuantities({
-    every: 1,
-    quantities: [
-      { name: "x", low: -1, high: 3, chains },
-      none,
-      { name: "far", low: -most, high: most, chains },
-    ],
-  });
+  const quantities = [{ low: -1, high: 3, chains }, none, { low: -most, high: most, chains }];
+  const [x, y, far] = await readQuantities({ every: 1, quantities }, ["x", "y", "far"]);
   assert.deepEqual(x, { name: "x", chains: [[-1, null, 3], [1]] });
   assert.deepEqual(y!.chains, [[null]]);
   assert.deepEqual(far!.chains, [[-most, null, most], [0]]);

@@ -34,7 +34,7 @@ fn data(quantities: &[Quantity]) -> Value {
             packed(&steps.collect::<Vec<_>>())
         };
         let chains: Vec<String> = q.chains.iter().map(chain).collect();
-        json!({ "name": q.name, "low": ends.0, "high": ends.1, "chains": chains })
+        json!({ "low": ends.0, "high": ends.1, "chains": chains })
     };
     json!({ "every": every, "quantities": quantities.iter().map(quantity).collect::<Vec<_>>() })
 }
@@ -43,10 +43,7 @@ fn data(quantities: &[Quantity]) -> Value {
 /// order.
 pub(super) fn scripts(quantities: &[Quantity]) -> String {
     // Within a script, `</` could end it.
-    let (data, program) = (
-        data(quantities).to_string().replace("</", "<\\/"),
-        PROGRAM.replace("</script", "<\\/script"),
-    );
+    let (data, program) = (data(quantities), PROGRAM.replace("</script", "<\\/script"));
     format!(
         "<noscript>The plots need JavaScript.</noscript>\n\
          <script type=\"application/json\" id=\"plot-data\">{data}</script>\n\
