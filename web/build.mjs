@@ -1,11 +1,13 @@
-// Bundles the studio's page and the viewer of reports into dist/, which is checked in so that
-// the binary can be built without Node. The same input gives the same bytes: CI compares.
+// Bundles the studio's page and the viewer of reports into dist/, and what notebooks need into the
+// Python package. The bundles are checked in, so that nothing else needs Node. The same input
+// gives the same bytes: CI compares.
 
 import { build } from "esbuild";
 import { mkdir, readFile, readdir, rm, writeFile, copyFile } from "node:fs/promises";
-import { dirname, join } from "node:path";
+import { join } from "node:path";
 
 const dist = "dist";
+const notebook = "../python/src/pcadlang/notebook";
 
 const common = {
   bundle: true,
@@ -47,25 +49,23 @@ async function licences(metafiles) {
   return parts.join("\n\n").replace(/\r\n/g, "\n");
 }
 
+// What is one file brings its style along as text, and its licence as a comment.
+const alone = { loader: { ".css": "text" }, legalComments: "inline" };
 await rm(dist, { recursive: true, force: true });
 await mkdir(dist, { recursive: true });
-const studio = await build({
-  ...common,
-  format: "esm",
-  entryPoints: { studio: "src/main.ts" },
-  outdir: dist,
-});
-const report = await build({
-  ...common,
-  format: "iife",
-  // A report is one file: its viewer brings its style along as text.
-  loader: { ".css": "text" },
-  entryPoints: { report: "src/report.ts" },
-  outdir: dist,
-});
+const bundles = [
+  { format: "esm", entryPoints: { studio: "src/main.ts" }, outdir: dist },
+  { ...alone, format: "iife", entryPoints: { report: "src/report.ts" }, outdir: dist },
+  { ...alone, format: "iife", entryPoints: { plots: "src/report_plots.ts" }, outdir: dist },
+  { ...alone, format: "esm", entryPoints: { widget: "src/notebook.ts" }, outdir: notebook },
+  { ...alone, format: "iife", entryPoints: { cells: "src/cells.ts" }, outdir: notebook },
+];
+const metafiles = [];
+for (const bundle of bundles) metafiles.push((await build({ ...common, ...bundle })).metafile);
 await copyFile(join("src", "index.html"), join(dist, "index.html"));
-await writeFile(join(dist, "licences.txt"), await licences([studio.metafile, report.metafile]));
-for (const name of (await readdir(dist)).sort()) {
-  const { length } = await readFile(join(dist, name));
-  console.log(`${join(dirname(join(dist, name)), name)}: ${(length / 1024).toFixed(0)} KiB`);
+await writeFile(join(dist, "licences.txt"), await licences(metafiles));
+const built = (await readdir(dist)).sort().map((name) => join(dist, name));
+for (const file of [...built, join(notebook, "widget.js"), join(notebook, "cells.js")]) {
+  const { length } = await readFile(file);
+  console.log(`${file}: ${(length / 1024).toFixed(0)} KiB`);
 }

@@ -214,8 +214,10 @@ def test_a_solid_is_a_widget_or_a_picture(
     vertices, triangles = solid.mesh()
     np.testing.assert_array_equal(np.frombuffer(made.vertices, "<f4").reshape(-1, 3), vertices)
     np.testing.assert_array_equal(np.frombuffer(made.triangles, "<u4").reshape(-1, 3), triangles)
-    # It needs no network.
-    assert "http" not in made._esm and "import " not in made._esm
+    # It needs no network: the one address is the name of HTML itself.
+    addresses = set(re.findall(r"https?://[^\"'`]*", made._esm))
+    assert addresses <= {"http://www.w3.org/1999/xhtml"}
+    assert not re.search(r"\bfrom *[\"']|\bimport[ (\"']", made._esm)
     monkeypatch.setattr(widget, "widget_class", _missing)
     assert set(shown(shell, solid)) == {"text/plain", "image/png"}
 
@@ -340,15 +342,10 @@ def test_the_lexer_knows_all_words_and_loses_no_text() -> None:
 
 
 def test_the_scripts_are_complete(tmp_path: Path) -> None:
-    text = cells.script()
-    patterns = re.search(r"const patterns = (.*);\n", text)
-    assert patterns is not None
-    kinds = dict(reversed(json.loads(patterns[1])))
-    assert re.fullmatch(kinds["keyword"], "assume") and re.fullmatch(kinds["label"], "@x/y[0]")
     node = shutil.which("node")
     if node is None:
         pytest.skip("needs node to check the syntax")
-    for name, source in [("cells.js", text), ("widget.mjs", widget.script())]:
+    for name, source in [("cells.js", cells.script()), ("widget.mjs", widget.script())]:
         (tmp_path / name).write_text(source, encoding="utf-8")
         subprocess.run([node, "--check", tmp_path / name], check=True)
 

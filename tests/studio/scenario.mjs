@@ -196,7 +196,7 @@ export async function scenario({ open, step, out, program }) {
   await step("plots of the run", async () => {
     await tab("Plots");
     await page.locator(".plot canvas").first().waitFor();
-    for (const kind of ["Ranks", "Pairs", "Intervals"]) {
+    for (const kind of ["Densities", "Ranks", "Pairs", "Intervals"]) {
       await press(kind);
       await page.locator(".plot canvas").first().waitFor();
     }

@@ -2,7 +2,7 @@
 //
 //     node studio.mjs BINARY [--out FOLDER] [--update] [--page FOLDER]
 //
-// `--update` replaces the golden images, `--page` serves another page than the binary's own.
+// `--update` replaces the golden images, `--page` takes another page and viewer than the binary's own.
 
 import { mkdirSync, readFileSync } from "node:fs";
 import { join, resolve } from "node:path";
@@ -13,6 +13,7 @@ import { appearance } from "./appearance.mjs";
 import { keyboard } from "./keyboard.mjs";
 import { language } from "./language.mjs";
 import { scenario } from "./scenario.mjs";
+import { standalone } from "./standalone.mjs";
 
 const { values, positionals } = parseArgs({
   allowPositionals: true,
@@ -83,11 +84,12 @@ async function step(name, task) {
 }
 
 try {
-  const tools = { open, step, out, update: values.update, program };
+  const tools = { open, step, out, update: values.update, program, viewer: values.page };
   await appearance(tools);
   await scenario(tools);
   await language(tools);
   await keyboard(tools);
+  await standalone(tools);
   await step("no page reported an error", async () => {
     const errors = opened.flatMap(({ errors }) => errors);
     if (errors.length > 0) throw new Error(errors.join("\n"));

@@ -1,4 +1,4 @@
-// What the user can ask of the program, each as one method; results go into the store.
+// The requests of the user, each as one method; results go into the store.
 
 import type { Connection } from "./connection";
 import { Latest } from "./latest";

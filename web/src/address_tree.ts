@@ -75,7 +75,7 @@ function shortened(node: Node): Node {
   return { ...node, children: node.children.map(shortened) };
 }
 
-/** Whether a choice passes the filter: parts of its address, its tags, or its family. */
+/** True if a choice passes the filter: parts of its address, its tags, or its family. */
 export function passes(choice: Choice, words: string[]): boolean {
   const text = `${choice.address} ${choice.tags.map((t) => `$${t}`).join(" ")} ${choice.family}`;
   const lower = text.toLowerCase();

@@ -2,9 +2,9 @@
 
 import { h } from "./dom";
 
-/** A colour of the page's theme. */
+/** A colour of the page's theme, which a report has at its plots only. */
 export function themeColour(name: string): string {
-  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  return getComputedStyle(document.querySelector(".plots") ?? document.documentElement).getPropertyValue(`--${name}`).trim();
 }
 
 /** A canvas of a size in CSS pixels, drawn by a function in those units. */

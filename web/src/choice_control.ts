@@ -11,8 +11,8 @@ export function sliderRange(choice: Choice, value: number): [number, number] {
   return low < high ? [low, high] : [low - 1, low + 1];
 }
 
-/** The values a choice can have if they are few: booleans, small integers, words. */
-export function fewValues(choice: Choice): Value[] | null {
+/** The values a choice can have if there are at most twelve: booleans, small integers, words. */
+export function discreteValues(choice: Choice): Value[] | null {
   if (typeof choice.value === "boolean") return [false, true];
   if (typeof choice.value === "string") {
     const words = [...(choice.support ?? "").matchAll(/"([^"]*)"/g)].map((m) => m[1]!);
@@ -29,7 +29,7 @@ function isWhole(choice: Choice): boolean {
   return typeof choice.value === "number" && /integer|whole|natural/.test(choice.support ?? "");
 }
 
-/** What a moved control says: `last` when the user let go, `drag` if the changes before it
+/** Called by a moved control: `last` when the user let go, `drag` if the changes before it
  * belong to the same movement. */
 export type Change = (value: Value, move: { last: boolean; drag: boolean }) => void;
 
@@ -64,8 +64,8 @@ export class ChoiceControl {
   }
 
   private controlFor(choice: Choice): HTMLElement {
-    const few = fewValues(choice);
-    if (few) return this.buttonsFor(few);
+    const values = discreteValues(choice);
+    if (values) return this.buttonsFor(values);
     if (typeof choice.value === "number") {
       return this.sliderFor(choice, "", () => this.choice?.value ?? 0, (x) => x);
     }

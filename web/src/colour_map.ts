@@ -1,6 +1,7 @@
 // The colours of parts, chains and uncertainty.
 
-type Rgb = [number, number, number];
+/** Red, green and blue, from 0 to 255. */
+export type Rgb = [number, number, number];
 
 // Viridis at eleven equally spaced places: perceptually uniform, and readable by the colour-blind.
 const VIRIDIS: Rgb[] = [

@@ -2,19 +2,16 @@
 
 import type { Actions } from "./actions";
 import { fill, h, number, select, setOptions } from "./dom";
-import { ErrorBox } from "./errors";
-import { Latest } from "./latest";
-import { figure, PictureView } from "./picture_view";
+import { Panel } from "./panel";
+import { PictureView } from "./picture_view";
 import { hasBest, runName, type Comparison, type Statistics } from "./protocol";
-import { SocketSource } from "./socket_source";
+import { StudioData } from "./studio_data";
 
 /** Two runs: pictures in the same layer, settings, quantities. */
-export class ComparePanel {
+export class ComparePanel extends Panel {
   readonly element: HTMLElement;
   private a: string | null = null;
   private b: string | null = null;
-  private visible = false;
-  private shown = "";
   private readonly selects = [
     select([], "", (run) => this.pick("a", run), { "aria-label": "First run" }),
     select([], "", (run) => this.pick("b", run), { "aria-label": "Second run" }),
@@ -23,10 +20,9 @@ export class ComparePanel {
   private readonly right = new PictureView("overlay");
   private readonly figures = h("div", { class: "figures" });
   private readonly tables = h("div");
-  private readonly error = new ErrorBox();
-  private readonly reads = new Latest<void>(() => this.read(), (e) => this.error.show(e));
 
-  constructor(private readonly actions: Actions) {
+  constructor(actions: Actions) {
+    super(actions, ["runs", "run"]);
     this.element = h(
       "div",
       { class: "panel compare" },
@@ -34,13 +30,6 @@ export class ComparePanel {
       this.error.element,
       h("div", { class: "scroll" }, this.figures, this.tables),
     );
-    actions.store.on(["runs", "run"], () => this.show());
-  }
-
-  /** The tab is shown, or no longer. */
-  setVisible(visible: boolean): void {
-    this.visible = visible;
-    this.show();
   }
 
   private pick(which: "a" | "b", run: string): void {
@@ -48,8 +37,7 @@ export class ComparePanel {
     this.show();
   }
 
-  private show(): void {
-    if (!this.visible) return;
+  protected show(): void {
     const { runs, run } = this.actions.store.now;
     const usable = runs.filter(hasBest).map((r) => r.run);
     if (usable.length < 2) {
@@ -70,12 +58,13 @@ export class ComparePanel {
       const found = runs.find((r) => r.run === name);
       return `${name} ${found?.state} ${found?.revision}`;
     };
-    const key = `${version(this.a)} ${version(this.b)}`;
-    if (key === this.shown) return;
-    this.shown = key;
+    if (!this.isNew(`${version(this.a)} ${version(this.b)}`)) return;
     this.showPicture(this.left, this.a);
     this.showPicture(this.right, this.b);
-    fill(this.figures, figure(this.left, runName(this.a)), figure(this.right, runName(this.b)));
+    const figure = (view: PictureView, run: string) => {
+      return h("figure", {}, view.element, h("figcaption", {}, runName(run)));
+    };
+    fill(this.figures, figure(this.left, this.a), figure(this.right, this.b));
     this.left.ask(0);
     this.right.ask(0);
     this.reads.call();
@@ -83,10 +72,10 @@ export class ComparePanel {
 
   private showPicture(view: PictureView, run: string): void {
     const known = { ...this.actions.store.now, view: "best" as const, run };
-    view.setSource(new SocketSource(this.actions.connection, known));
+    view.setData(new StudioData(this.actions.connection, known));
   }
 
-  private async read(): Promise<void> {
+  protected async read(): Promise<void> {
     const { a, b } = this;
     if (!a || !b) return;
     let data: Comparison;

@@ -1,4 +1,4 @@
-// esbuild turns style sheets into studio.css, or into text for the report.
+// esbuild turns style sheets into studio.css, or into text for reports and notebooks.
 declare module "*.css" {
   const text: string;
   export default text;

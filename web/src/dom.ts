@@ -46,6 +46,26 @@ export function button(
   return h("button", { type: "button", onclick, ...attributes }, text);
 }
 
+/** A field for words that lines must have; the callback gets them in lower case. */
+export function filterField(
+  label: string,
+  placeholder: string,
+  onwords: (words: string[]) => void,
+): HTMLInputElement {
+  const field = h("input", { type: "search", placeholder, "aria-label": label });
+  field.addEventListener("input", () => {
+    onwords(field.value.toLowerCase().split(/\s+/).filter(Boolean));
+  });
+  return field;
+}
+
+/** Pairs of name and value below each other, without those of which nothing is known. */
+export function factList(facts: [string, string][]): HTMLElement {
+  const known = facts.filter(([, value]) => value !== "–");
+  const rows = known.map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, value)));
+  return h("dl", {}, ...rows);
+}
+
 /** A select; options are names, or pairs of value and name. */
 export function select(
   options: (string | [string, string])[],

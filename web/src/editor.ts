@@ -11,7 +11,7 @@ import { pcadLanguage } from "./highlight";
 import type { Diagnostic } from "./protocol";
 
 /** The keys that the panel around the editor handles. */
-export interface EditorKeys {
+interface EditorKeys {
   apply(): void;
   save(): void;
 }

@@ -1,4 +1,4 @@
-// What is open, in the fragment of the page's address: a reload finds everything as it was, and
+// The open things, in the fragment of the page's address: a reload finds everything as it was, and
 // the token goes to nobody.
 
 /** The parts of the fragment. */

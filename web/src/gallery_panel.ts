@@ -1,8 +1,8 @@
 // The tab Gallery: the cases of an `evaluate` folder, failures and doubtful ones first.
 
 import type { Actions } from "./actions";
-import { fill, h, number, select, setOptions, duration } from "./dom";
-import { ErrorBox } from "./errors";
+import { factList, fill, h, number, select, setOptions, duration } from "./dom";
+import { Panel } from "./panel";
 import type { Case } from "./protocol";
 
 type Order = "failures" | "doubt" | "score" | "name";
@@ -15,20 +15,19 @@ const ORDERS: [Order, string][] = [
 ];
 
 /** Cards of cases. */
-export class GalleryPanel {
+export class GalleryPanel extends Panel {
   readonly element: HTMLElement;
   private cases: Case[] = [];
   private order: Order = "failures";
   private folder = "";
-  private visible = false;
   private readonly cards = h("div", { class: "cards scroll" });
   private readonly count = h("span", { class: "muted" });
-  private readonly error = new ErrorBox();
   private readonly folders = select([], "", (folder) => this.open(folder), {
     "aria-label": "Folder of an evaluation",
   });
 
-  constructor(private readonly actions: Actions) {
+  constructor(actions: Actions) {
+    super(actions, ["folder"]);
     const orders = select(ORDERS, this.order, (order) => {
       this.order = order as Order;
       this.draw();
@@ -40,17 +39,9 @@ export class GalleryPanel {
       this.error.element,
       this.cards,
     );
-    actions.store.on(["folder"], () => this.show());
   }
 
-  /** The tab is shown, or no longer. */
-  setVisible(visible: boolean): void {
-    this.visible = visible;
-    this.show();
-  }
-
-  private show(): void {
-    if (!this.visible) return;
+  protected show(): void {
     const folders = this.actions.store.now.folder?.evaluations ?? [];
     this.folders.hidden = folders.length === 0;
     if (folders.length === 0) {
@@ -65,13 +56,17 @@ export class GalleryPanel {
 
   private open(folder: string): void {
     this.folder = folder;
-    void this.error.guard(async () => {
-      const params = { folder };
-      const answer = await this.actions.connection.ask<{ cases: Case[] }>("evaluation", params);
-      if (folder !== this.folder) return;
-      this.cases = answer.cases;
-      this.draw();
-    });
+    this.reads.call();
+  }
+
+  protected async read(): Promise<void> {
+    const { folder } = this;
+    const params = { folder };
+    const answer = await this.actions.connection.ask<{ cases: Case[] }>("evaluation", params);
+    if (folder !== this.folder) return;
+    this.error.clear();
+    this.cases = answer.cases;
+    this.draw();
   }
 
   private draw(): void {
@@ -90,22 +85,18 @@ export class GalleryPanel {
       ["R-hat", number(c.r_hat, 3)],
       ["time", duration(c.seconds)],
     ];
-    const list = h("dl", {});
-    for (const [name, value] of facts) {
-      if (value !== "–") list.append(h("div", {}, h("dt", {}, name), h("dd", {}, value)));
-    }
     return h(
       "article",
       { class: c.error ? "card failed-card" : "card" },
       h("div", { class: "thumb" }, image),
       h("h3", {}, c.name, c.error ? h("span", { class: "state failed" }, c.state) : null),
-      c.error ? h("pre", { class: "failed" }, c.error) : list,
+      c.error ? h("pre", { class: "failed" }, c.error) : factList(facts),
     );
   }
 }
 
 /** Cases in an order; `failures` is that of the program. */
-export function sortCases(cases: Case[], order: Order): Case[] {
+function sortCases(cases: Case[], order: Order): Case[] {
   const last = (x: number | null, sign: number) => (x === null ? Infinity : sign * x);
   const keys: Record<Order, (a: Case, b: Case) => number> = {
     failures: () => 0,

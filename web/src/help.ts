@@ -1,4 +1,4 @@
-// What keys do, and whose work the page contains.
+// The keys, and the licences of the page's parts.
 
 import { button, h } from "./dom";
 

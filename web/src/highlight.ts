@@ -1,46 +1,29 @@
-// The language of programs for CodeMirror: tokens from the TextMate grammar, and their colours.
+// The language of programs for CodeMirror: the grammar's tokens, and their colours.
 
 import { HighlightStyle, LanguageSupport, StreamLanguage } from "@codemirror/language";
 import { syntaxHighlighting } from "@codemirror/language";
 import { tags as t, type Tag } from "@lezer/highlight";
-import grammar from "../../editors/vscode/syntaxes/pcad.tmLanguage.json";
-import { Tokenizer, type Grammar, type Region } from "./grammar";
+import { streamMode, type Kind } from "./tokens";
 
-const tokenizer = new Tokenizer(grammar as Grammar);
+const TAGS: Record<Kind, Tag> = {
+  comment: t.comment,
+  string: t.string,
+  escape: t.escape,
+  number: t.number,
+  bool: t.bool,
+  address: t.labelName,
+  tag: t.attributeName,
+  function: t.function(t.variableName),
+  random: t.definitionOperator,
+  keyword: t.keyword,
+  operator: t.operator,
+  variable: t.variableName,
+};
 
-// The longest prefix of a scope's name decides.
-const SCOPES: [string, string, Tag][] = [
-  ["comment.", "comment", t.comment],
-  ["string.", "string", t.string],
-  ["constant.character.escape", "escape", t.escape],
-  ["constant.numeric", "number", t.number],
-  ["constant.language", "bool", t.bool],
-  ["variable.other.constant.address", "address", t.labelName],
-  ["entity.other.attribute-name", "tag", t.attributeName],
-  ["entity.name.function", "function", t.function(t.variableName)],
-  ["keyword.operator.random", "random", t.definitionOperator],
-  ["keyword.operator.word", "keyword", t.keyword],
-  ["keyword.operator", "operator", t.operator],
-  ["keyword", "keyword", t.keyword],
-  ["variable.other.pcad", "variable", t.variableName],
-];
-
-function styleOf(scope: string | null): string | null {
-  return SCOPES.find(([prefix]) => scope?.startsWith(prefix))?.[1] ?? null;
-}
-
-const language = StreamLanguage.define<{ region: Region }>({
+const language = StreamLanguage.define({
   name: "pcad",
-  startState: () => ({ region: null }),
-  copyState: ({ region }) => ({ region }),
-  token(stream, state) {
-    const { token, region } = tokenizer.next(stream.string, stream.pos, state.region);
-    // An end without length would stop CodeMirror, which asks for progress.
-    stream.pos = Math.max(token.to, stream.pos + 1);
-    state.region = region;
-    return styleOf(token.scope);
-  },
-  tokenTable: Object.fromEntries(SCOPES.map(([, name, tag]) => [name, tag])),
+  ...streamMode((kind) => kind),
+  tokenTable: TAGS,
   languageData: {
     commentTokens: { line: "//", block: { open: "/*", close: "*/" } },
     closeBrackets: { brackets: ["(", "[", "{", '"'] },

@@ -49,6 +49,6 @@ export class LanguageServer {
 }
 
 /** The address under which the language server knows a file. */
-export function fileUri(file: string): string {
+function fileUri(file: string): string {
   return `file:///studio/${file.split("/").map(encodeURIComponent).join("/")}`;
 }

@@ -1,34 +1,29 @@
-// At most one request under way, and the newest wish wins: what keeps dragging smooth however
+// At most one request under way, and the newest one wins: what keeps dragging smooth however
 // slow the program answers.
 
 /** Runs a task one at a time; of the calls made meanwhile only the last one is run. */
 export class Latest<A> {
   private running = false;
-  private next: { wish: A } | null = null;
+  private next: { request: A } | null = null;
 
   constructor(
-    private readonly task: (wish: A) => Promise<void>,
+    private readonly task: (request: A) => Promise<void>,
     private readonly onError: (error: unknown) => void = () => {},
   ) {}
 
-  /** Asks for the task with a new wish. */
-  call(wish: A): void {
-    this.next = { wish };
+  /** Asks for the task with a new request. */
+  call(request: A): void {
+    this.next = { request };
     if (!this.running) void this.work();
-  }
-
-  /** Whether a call is under way. */
-  get busy(): boolean {
-    return this.running;
   }
 
   private async work(): Promise<void> {
     this.running = true;
     while (this.next) {
-      const { wish } = this.next;
+      const { request } = this.next;
       this.next = null;
       try {
-        await this.task(wish);
+        await this.task(request);
       } catch (error) {
         this.onError(error);
       }

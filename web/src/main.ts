@@ -11,6 +11,7 @@ import { ErrorBox } from "./errors";
 import { readPlace, writePlace } from "./fragment";
 import { GalleryPanel } from "./gallery_panel";
 import { ModesPanel } from "./modes_panel";
+import type { Panel } from "./panel";
 import { PlotsPanel } from "./plots_panel";
 import { ProgramPanel } from "./program_panel";
 import { PromptPanel } from "./prompt_panel";
@@ -40,11 +41,7 @@ const trace = new TracePanel(actions);
 trace.onMoved = (coarse) => scene.follow(coarse);
 
 const programTab = h("div", { class: "panel program-tab" });
-interface Panel {
-  element: HTMLElement;
-  setVisible(visible: boolean): void;
-}
-const tabOf = (key: string, name: string, panel: Panel): Tab => {
+const tabOf = (key: string, name: string, panel: Pick<Panel, "element" | "setVisible">): Tab => {
   return { key, name, panel: panel.element, setVisible: (v) => panel.setVisible(v) };
 };
 const tabs = new Tabs(
@@ -109,7 +106,7 @@ arrange();
 acceptDrops(root, (file) => void bar.error.guard(() => bar.take(file)));
 
 connection.onChange = (connected) => {
-  store.set({ connected, wasConnected: store.now.wasConnected || connected });
+  store.set({ connected });
   if (connected) {
     banner.hidden = true;
     void errors.guard(async () => {

@@ -1,49 +1,34 @@
 // The tab Modes: the best state of each mode as a picture, and how probable the modes are.
 
 import type { Actions } from "./actions";
-import { fill, h, number } from "./dom";
-import { ErrorBox } from "./errors";
-import { Latest } from "./latest";
+import { factList, fill, h, number } from "./dom";
+import { Panel } from "./panel";
 import { isLive, type Mode, type Summary } from "./protocol";
-import { askPicture } from "./socket_source";
+import { askPicture } from "./studio_data";
 
 /** Modes as cards; a click shows one in the viewer. */
-export class ModesPanel {
+export class ModesPanel extends Panel {
   readonly element: HTMLElement;
   private readonly cards = h("div", { class: "cards scroll" });
-  private readonly error = new ErrorBox();
-  private readonly reads = new Latest<void>(() => this.read(), (e) => this.error.show(e));
-  private visible = false;
-  private askedFor = "";
 
-  constructor(private readonly actions: Actions) {
+  constructor(actions: Actions) {
+    super(actions, ["runs", "run", "modes"]);
     this.element = h("div", { class: "panel" }, this.error.element, this.cards);
-    actions.store.on(["runs", "run", "modes"], () => this.show());
     actions.store.on(["view", "at"], () => this.mark());
   }
 
-  /** The tab is shown, or no longer. */
-  setVisible(visible: boolean): void {
-    this.visible = visible;
-    this.show();
-  }
-
-  private show(): void {
-    if (!this.visible) return;
+  protected show(): void {
     const run = this.actions.store.currentRun;
     if (!run || isLive(run) || run.state === "failed") {
-      this.askedFor = "";
+      this.isNew("");
       const text = run ? "Modes are known when the run has ended." : "Modes are those of a run.";
       fill(this.cards, h("div", { class: "empty" }, text));
       return;
     }
-    const key = `${run.run} ${run.state} ${run.draws}`;
-    if (key === this.askedFor) return;
-    this.askedFor = key;
-    this.reads.call();
+    if (this.isNew(`${run.run} ${run.state} ${run.draws}`)) this.reads.call();
   }
 
-  private async read(): Promise<void> {
+  protected async read(): Promise<void> {
     const { connection, store } = this.actions;
     const run = store.now.run;
     if (run === null) return;
@@ -77,17 +62,13 @@ export class ModesPanel {
       ["log joint", number(mode.log_joint)],
       ["log evidence", evidence(mode)],
     ];
-    const list = h("dl", {});
-    for (const [name, value] of facts) {
-      if (value !== "–") list.append(h("div", {}, h("dt", {}, name), h("dd", {}, value)));
-    }
     const show = () => this.actions.store.set({ view: "modes", at: index });
     const element = h(
       "button",
       { type: "button", class: "card", onclick: show },
       h("div", { class: "thumb" }, image),
       h("h3", {}, `Mode ${index + 1}`),
-      list,
+      factList(facts),
     );
     return { element, image };
   }

@@ -1,25 +1,11 @@
 // The picture of a frame in one of its layers, with the viewpoint it is rendered from.
 
 import { Disconnected } from "./connection";
-import { append, h, select, setOptions } from "./dom";
+import { h, select, setOptions } from "./dom";
 import { ErrorBox } from "./errors";
 import { Latest } from "./latest";
 import type { Camera, Vec3 } from "./protocol";
-import type { Picture, Source } from "./source";
-
-const LAYERS: [string, string][] = [
-  ["overlay", "Overlay"],
-  ["photo", "Photograph"],
-  ["scene", "Scene"],
-  ["depth", "Depth"],
-  ["normals", "Normals"],
-  ["regions", "Parts"],
-  ["contours", "Contours of the scene"],
-  ["photo_contours", "Contours of the photograph"],
-  ["residuals", "Residuals"],
-  ["joints", "Joints"],
-  ["mask", "Mask"],
-];
+import { LAYERS, type ImageUrl, type ViewerData } from "./viewer_data";
 
 const VIEWPOINTS: [string, string][] = [
   ["given", "From the camera"],
@@ -30,12 +16,7 @@ const VIEWPOINTS: [string, string][] = [
   ["behind", "From behind"],
 ];
 
-/** The name of a layer as the user reads it. */
-export function layerName(layer: string): string {
-  return LAYERS.find(([key]) => key === layer)?.[1] ?? layer;
-}
-
-interface Wish {
+interface Request {
   frame: number;
   size: number;
 }
@@ -47,20 +28,20 @@ export class PictureView {
   /** The camera of the 3D view, for pictures from there. */
   viewOf3D: () => Camera | null = () => null;
 
-  private source: Source | null = null;
+  private data: ViewerData | null = null;
   private frame = 0;
-  /** The layer that the user chose, and the one shown: not every source has every layer. */
+  /** The layer that the user chose, and the one shown: not all data have every layer. */
   private wanted: string;
   private layer: string;
   private viewpoint = "given";
-  private shown: Picture | null = null;
+  private shown: ImageUrl | null = null;
   private readonly image = h("img", { alt: "", draggable: "false" });
   private readonly empty = h("div", { class: "empty" }, "No picture yet");
   private readonly note = h("span", { class: "muted" });
   private readonly error = new ErrorBox();
   private readonly layers: HTMLSelectElement;
   private readonly viewpoints: HTMLSelectElement;
-  private readonly work = new Latest<Wish>((wish) => this.load(wish), (e) => this.fail(e));
+  private readonly work = new Latest<Request>((request) => this.load(request), (e) => this.fail(e));
   private fullTimer: ReturnType<typeof setTimeout> | null = null;
 
   constructor(
@@ -79,18 +60,18 @@ export class PictureView {
     new ResizeObserver(() => this.later(300)).observe(this.element);
   }
 
-  /** Shows frames of another source. */
-  setSource(source: Source | null): void {
-    const other = source?.key !== this.source?.key;
-    this.source = source;
-    const known = source?.layers ?? [];
+  /** Shows frames of other data. */
+  setData(data: ViewerData | null): void {
+    const other = data?.key !== this.data?.key;
+    this.data = data;
+    const known = data?.layers ?? [];
     if (known.length > 0) this.layer = known.includes(this.wanted) ? this.wanted : known[0]!;
     const options = LAYERS.filter(([key]) => known.includes(key));
     setOptions(this.layers, options, this.layer);
     this.layers.hidden = options.length === 0;
-    this.viewpoints.hidden = !source?.viewpoints;
-    this.note.textContent = source?.pictureNote ?? "";
-    if (!source || source.frames.length === 0) void this.show(null);
+    this.viewpoints.hidden = !data?.viewpoints;
+    this.note.textContent = data?.pictureNote ?? "";
+    if (!data || data.frames.length === 0) void this.show(null);
     else if (other) this.error.clear();
   }
 
@@ -102,7 +83,7 @@ export class PictureView {
   /** Asks for a frame's picture; a coarse one is followed by a full one when things rest. */
   ask(frame: number, coarse = false): void {
     this.frame = frame;
-    if (!this.source || this.source.frames.length === 0 || !this.visible()) return;
+    if (!this.data || this.data.frames.length === 0 || !this.visible()) return;
     this.work.call({ frame, size: coarse ? 224 : this.fullSize() });
     if (coarse) this.later(250);
   }
@@ -145,12 +126,12 @@ export class PictureView {
     return Math.min(1536, Math.max(256, Math.ceil(pixels / 64) * 64));
   }
 
-  private async load({ frame, size }: Wish): Promise<void> {
-    const source = this.source;
-    if (!source || frame >= source.frames.length) return;
-    const camera = await this.cameraFor(source, frame);
-    const picture = await source.picture(frame, this.layer, size, camera);
-    if (source.key !== this.source?.key) {
+  private async load({ frame, size }: Request): Promise<void> {
+    const data = this.data;
+    if (!data || frame >= data.frames.length) return;
+    const camera = await this.cameraFor(data, frame);
+    const picture = await data.picture(frame, this.layer, size, camera);
+    if (data.key !== this.data?.key) {
       if (picture.owned) URL.revokeObjectURL(picture.url);
       return;
     }
@@ -158,21 +139,21 @@ export class PictureView {
     await this.show(picture);
   }
 
-  private async cameraFor(source: Source, frame: number): Promise<Camera | undefined> {
+  private async cameraFor(data: ViewerData, frame: number): Promise<Camera | undefined> {
     if (this.viewpoint === "given") return undefined;
     if (this.viewpoint === "view") return this.viewOf3D() ?? undefined;
-    const [camera, mesh] = await Promise.all([source.camera(frame), source.mesh(frame)]);
+    const [camera, mesh] = await Promise.all([data.camera(frame), data.mesh(frame)]);
     return camera ? turned(camera, this.viewpoint, middle(mesh.positions)) : undefined;
   }
 
-  private async show(picture: Picture | null): Promise<void> {
+  private async show(picture: ImageUrl | null): Promise<void> {
     const before = this.shown;
     this.shown = picture;
     this.image.hidden = picture === null;
     this.empty.hidden = picture !== null;
     if (picture) {
       this.image.src = picture.url;
-      this.image.alt = layerName(this.layer);
+      this.image.alt = LAYERS.find(([key]) => key === this.layer)?.[1] ?? this.layer;
       // Decoded before the next is asked for, so that the view never flashes.
       await this.image.decode().catch(() => {});
     }
@@ -217,11 +198,4 @@ function middle(positions: Float32Array): Vec3 {
 
 function fovOfHeight(height: number, distance: number): number {
   return (2 * Math.atan(height / 2 / Math.max(distance, 1e-6)) * 180) / Math.PI;
-}
-
-/** A picture with a caption, for galleries and comparisons. */
-export function figure(view: PictureView, caption: string): HTMLElement {
-  const element = h("figure");
-  append(element, view.element, h("figcaption", {}, caption));
-  return element;
 }

@@ -38,6 +38,5 @@ export function rankPlot(quantity: Quantity, width: number): HTMLElement {
       context.stroke();
     });
   });
-  const caption = h("figcaption", {}, h("code", {}, quantity.name));
-  return h("figure", { class: "plot" }, caption, picture);
+  return h("figure", { class: "plot" }, picture);
 }

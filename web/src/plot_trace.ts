@@ -7,7 +7,7 @@ import { h, number } from "./dom";
 import type { Quantity } from "./protocol";
 
 /** A trace plot of one quantity. */
-export function tracePlot(quantity: Quantity, every: number, width: number): HTMLElement {
+export function tracePlot(quantity: Quantity, width: number, every: number): HTMLElement {
   const longest = Math.max(0, ...quantity.chains.map((c) => c.length));
   const x = Array.from({ length: longest }, (_, i) => i * every);
   const y = quantity.chains.map((chain) => {
@@ -19,7 +19,7 @@ export function tracePlot(quantity: Quantity, every: number, width: number): HTM
     ticks: { show: false },
     font: `11px ${themeColour("sans")}`,
   };
-  const element = h("figure", { class: "plot" }, h("figcaption", {}, h("code", {}, quantity.name)));
+  const element = h("figure", { class: "plot" });
   const options: uPlot.Options = {
     width,
     height: 130,

@@ -2,9 +2,9 @@
 
 import type { Actions } from "./actions";
 import { fill, h, Segments } from "./dom";
-import { ErrorBox } from "./errors";
-import { Latest } from "./latest";
+import { Panel } from "./panel";
 import { interval, type Interval } from "./plot_data";
+import { densityPlot } from "./plot_density";
 import { forestPlot } from "./plot_forest";
 import { MOST_PAIRS, pairsPlot } from "./plot_pairs";
 import { rankPlot } from "./plot_rank";
@@ -14,29 +14,31 @@ import { QuantityList } from "./quantity_list";
 
 const KINDS: [string, string][] = [
   ["trace", "Traces"],
+  ["density", "Densities"],
   ["rank", "Ranks"],
   ["pairs", "Pairs"],
   ["forest", "Intervals"],
 ];
+// Plots of one quantity each.
+type Plot = (quantity: Quantity, width: number, every: number) => HTMLElement;
+const SINGLE: Record<string, Plot> = { trace: tracePlot, density: densityPlot, rank: rankPlot };
 const MOST_PLOTS = 40;
 const WAIT = 3000;
 
 /** Plots of the run that is looked at; while it runs they follow. */
-export class PlotsPanel {
+export class PlotsPanel extends Panel {
   readonly element: HTMLElement;
   private readonly kinds: Segments;
   private readonly list: QuantityList;
   private readonly plots = h("div", { class: "plots scroll" });
-  private readonly error = new ErrorBox();
-  private readonly reads = new Latest<void>(() => this.read(), (e) => this.error.show(e));
   private statistics: Record<string, Statistics> = {};
   private data: { quantities: Quantity[]; every: number } | null = null;
-  private visible = false;
   private askedFor = "";
   private askedAt = 0;
   private later: ReturnType<typeof setTimeout> | null = null;
 
-  constructor(private readonly actions: Actions) {
+  constructor(actions: Actions) {
+    super(actions, ["runs", "run"]);
     this.kinds = new Segments("Kind of plot", KINDS, "trace", () => this.draw());
     this.list = new QuantityList(() => this.reads.call());
     this.element = h(
@@ -47,7 +49,6 @@ export class PlotsPanel {
       this.error.element,
       this.plots,
     );
-    actions.store.on(["runs", "run"], () => this.follow());
     let width = 0;
     new ResizeObserver(() => {
       // Plots have the panel's width; drawing them does not change it.
@@ -57,14 +58,7 @@ export class PlotsPanel {
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
   }
 
-  /** The tab is shown, or no longer. */
-  setVisible(visible: boolean): void {
-    this.visible = visible;
-    this.follow();
-  }
-
-  private follow(): void {
-    if (!this.visible) return;
+  protected show(): void {
     const run = this.actions.store.currentRun;
     const key = run ? `${run.run} ${run.draws} ${run.state}` : "";
     if (key === this.askedFor) return;
@@ -82,7 +76,7 @@ export class PlotsPanel {
     this.reads.call();
   }
 
-  private async read(): Promise<void> {
+  protected async read(): Promise<void> {
     const { store, connection } = this.actions;
     const run = store.currentRun;
     if (!run || run.draws === 0) {
@@ -117,10 +111,14 @@ export class PlotsPanel {
       return;
     }
     const kind = this.kinds.value;
-    if (kind === "trace") {
-      fill(this.plots, ...quantities.map((q) => tracePlot(q, data.every, width)));
-    } else if (kind === "rank") {
-      fill(this.plots, ...quantities.map((q) => rankPlot(q, width)));
+    const single = SINGLE[kind];
+    if (single) {
+      const named = (q: Quantity) => {
+        const plot = single(q, width, data.every);
+        plot.prepend(h("figcaption", {}, h("code", {}, q.name)));
+        return plot;
+      };
+      fill(this.plots, ...quantities.map(named));
     } else if (kind === "pairs") {
       const note = `The first ${MOST_PAIRS} of ${quantities.length} chosen quantities.`;
       const more = quantities.length > MOST_PAIRS ? h("p", { class: "muted" }, note) : null;

@@ -4,7 +4,7 @@ import type { Actions } from "./actions";
 import { button, h } from "./dom";
 import { explain } from "./errors";
 import { Latest } from "./latest";
-import { askPicture } from "./socket_source";
+import { askPicture } from "./studio_data";
 
 interface Completion {
   from: number;
@@ -103,7 +103,7 @@ export class PromptPanel {
       if (reply.clears) this.output.replaceChildren();
       if (reply.text !== "") this.print(reply.text);
       if (reply.picture) await this.printPicture();
-      if (reply.confirm) this.ask(reply.confirm);
+      if (reply.confirm) this.confirm(reply.confirm);
       this.actions.refreshSession();
     } catch (error) {
       const { message, hint } = explain(error);
@@ -116,7 +116,7 @@ export class PromptPanel {
     this.input.focus({ preventScroll: true });
   }
 
-  private ask(confirm: { question: string; then: string }): void {
+  private confirm(confirm: { question: string; then: string }): void {
     const line = h("div", { class: "confirm" }, confirm.question);
     const answer = (then: string | null) => {
       line.remove();
@@ -203,7 +203,7 @@ export class PromptPanel {
   }
 }
 
-/** Whether a bracket is still open, so that the entry goes on in the next line. */
+/** True if a bracket is still open, so that the entry goes on in the next line. */
 export function isOpen(text: string): boolean {
   let depth = 0;
   let inString = false;

@@ -50,7 +50,6 @@ export interface Session {
   undo: string | null;
   redo: string | null;
   has_view: boolean;
-  plans: string[];
   presets: { name: string; about: string }[];
 }
 
@@ -105,7 +104,6 @@ export interface Run {
   chains: number;
   ended: number;
   steps: number;
-  rate: number | null;
   elapsed: number;
   left: number | null;
   done: number | null;
@@ -125,7 +123,6 @@ export interface Settings {
   quality?: string;
   time?: number;
   steps?: number;
-  warmup?: number;
   set?: Record<string, string>;
 }
 
@@ -141,7 +138,7 @@ export interface Draws {
   chains: number;
 }
 
-/** What is known of a quantity's posterior: mean, sd, quantiles, r_hat, ess_bulk and more. */
+/** The statistics of a quantity's posterior: mean, sd, quantiles, r_hat, ess_bulk and more. */
 export type Statistics = Record<string, number | null>;
 
 export interface Mode {
@@ -158,7 +155,6 @@ export interface Summary {
   modes: Mode[];
   warnings: string[];
   approximate: string[];
-  kernels: Record<string, unknown>[];
   choices: Record<string, unknown>[];
   quantities: Record<string, Statistics>;
   files: string[];
@@ -299,17 +295,17 @@ export function runName(run: string): string {
   return run.replace(/^runs\//, "");
 }
 
-/** Whether a run has a best state, whose picture can be asked for. */
+/** True if a run has a best state, whose picture can be asked for. */
 export function hasBest(run: Run | null): boolean {
   return run !== null && (run.revision > 0 || run.draws > 0);
 }
 
-/** Whether a run still works or waits, so that it can be stopped. */
+/** True if a run still works or waits, so that it can be stopped. */
 export function isLive(run: Run): boolean {
   return ["waiting", "running", "paused", "stopping"].includes(run.state);
 }
 
-/** Whether a run that does not work at present can go on. */
+/** True if a run that does not work at present can go on. */
 export function canGoOn(run: Run): boolean {
   return ["paused", "stopped", "interrupted"].includes(run.state);
 }

@@ -1,6 +1,6 @@
 // The list from which quantities are chosen, with their R-hat and effective sample size.
 
-import { button, h, number } from "./dom";
+import { button, filterField, h, number } from "./dom";
 import type { Statistics } from "./protocol";
 import { VirtualList } from "./virtual_list";
 
@@ -17,13 +17,8 @@ export class QuantityList {
   private readonly list = new VirtualList(24, (i) => this.line(this.names[i]!));
 
   constructor(private readonly onChange: () => void) {
-    const filter = h("input", {
-      type: "search",
-      placeholder: "Filter quantities",
-      "aria-label": "Filter quantities",
-    });
-    filter.addEventListener("input", () => {
-      this.words = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const filter = filterField("Filter quantities", "Filter quantities", (words) => {
+      this.words = words;
       this.draw();
     });
     const none = button("None", () => this.choose([]), { title: "Choose none" });

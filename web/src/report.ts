@@ -1,13 +1,8 @@
 // The viewer of report.html: finds its place and its data in the page, needs no network, and
 // does nothing where either is missing.
 
-import controls from "./controls.css";
-import reportStyle from "./report.css";
-import theme from "./theme.css";
-import viewerStyle from "./viewer.css";
-import { EmbeddedSource, type EmbeddedScene } from "./embedded_source";
-import { h } from "./dom";
-import { Viewer } from "./viewer";
+import { EmbeddedData, type EmbeddedScene } from "./embedded_data";
+import { standaloneViewer } from "./standalone";
 
 function start(): void {
   const place = document.getElementById("viewer");
@@ -21,13 +16,8 @@ function start(): void {
     return;
   }
   if (!scene?.draws?.length) return;
-  // The report has a style of its own: ours is kept inside the viewer by nesting.
-  const variables = theme.replaceAll(":root", "#viewer");
-  const inside = `#viewer { ${controls} ${viewerStyle} ${reportStyle} }`;
-  document.head.append(h("style", {}, `${variables}\n${inside}`));
-  const viewer = new Viewer();
-  place.replaceChildren(viewer.element);
-  viewer.setSource(new EmbeddedSource(scene));
+  place.style.height = "min(78vh, 720px)";
+  standaloneViewer(place).setData(new EmbeddedData(scene));
 }
 
 if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start);

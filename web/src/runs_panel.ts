@@ -2,21 +2,17 @@
 
 import type { Actions } from "./actions";
 import { button, duration, fill, h, number } from "./dom";
-import { ErrorBox } from "./errors";
+import { Panel } from "./panel";
 import { canGoOn, hasBest, isLive, runName, type Run, type Summary } from "./protocol";
-import { Latest } from "./latest";
 
 /** A table of runs; below it what the chosen one left. */
-export class RunsPanel {
+export class RunsPanel extends Panel {
   readonly element: HTMLElement;
   private readonly body = h("tbody");
   private readonly about = h("div", { class: "run-about" });
-  private readonly error = new ErrorBox();
-  private readonly reads = new Latest<void>(() => this.read(), (e) => this.error.show(e));
-  private visible = false;
-  private askedFor = "";
 
-  constructor(private readonly actions: Actions) {
+  constructor(actions: Actions) {
+    super(actions, ["runs", "run"]);
     const head = ["Run", "State", "Best", "R-hat", "Draws", "Time", ""];
     const numbers = new Set(["Best", "R-hat", "Draws", "Time"]);
     const titles = head.map((t) => h("th", { class: numbers.has(t) ? "number" : null }, t));
@@ -31,17 +27,9 @@ export class RunsPanel {
         this.about,
       ),
     );
-    actions.store.on(["runs", "run"], () => this.show());
   }
 
-  /** The tab is shown, or no longer. */
-  setVisible(visible: boolean): void {
-    this.visible = visible;
-    this.show();
-  }
-
-  private show(): void {
-    if (!this.visible) return;
+  protected show(): void {
     const { runs } = this.actions.store.now;
     if (runs.length === 0) {
       const text = "No runs yet: Start makes one.";
@@ -52,20 +40,12 @@ export class RunsPanel {
     // Under the pointer buttons must stay: rows are replaced only when their text changed.
     const rows = [...runs].reverse().map((run) => this.row(run));
     const old = [...this.body.children];
-    const same = old.length === rows.length;
-    rows.forEach((row, i) => {
-      if (!same || old[i]!.outerHTML !== row.outerHTML) {
-        if (same) old[i]!.replaceWith(row);
-      }
-    });
-    if (!same) fill(this.body, ...rows);
+    if (old.length !== rows.length) fill(this.body, ...rows);
+    else old.forEach((o, i) => o.outerHTML !== rows[i]!.outerHTML && o.replaceWith(rows[i]!));
     const run = this.actions.store.currentRun;
-    const key = run ? `${run.run} ${run.state} ${hasBest(run)}` : "";
-    if (key !== this.askedFor) {
-      this.askedFor = key;
-      fill(this.about);
-      if (run) this.reads.call();
-    }
+    if (!this.isNew(run ? `${run.run} ${run.state} ${hasBest(run)}` : "")) return;
+    fill(this.about);
+    if (run) this.reads.call();
   }
 
   private row(run: Run): HTMLElement {
@@ -99,7 +79,7 @@ export class RunsPanel {
     );
   }
 
-  private async read(): Promise<void> {
+  protected async read(): Promise<void> {
     const { connection, store } = this.actions;
     const run = store.currentRun;
     if (!run || run.state === "waiting" || !hasBest(run)) return;

@@ -59,6 +59,7 @@ export class Scene3D {
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", "3D view; arrow keys turn it, plus and minus zoom");
     canvas.addEventListener("keydown", (event) => this.key(event));
+    canvas.addEventListener("dblclick", () => this.reset());
     container.append(canvas);
     this.light.position.set(1.5, 2.5, 3);
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8a8f98, 1.3), this.light);
@@ -76,6 +77,13 @@ export class Scene3D {
     this.rebuild();
     if (mesh && (!this.framed || (!this.touched && this.isElsewhere(before)))) this.reset();
     this.placePhoto();
+  }
+
+  /** Gives the context for drawing back to the browser. */
+  dispose(): void {
+    this.controls.dispose();
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
   }
 
   /** Shows nothing. */
@@ -134,13 +142,13 @@ export class Scene3D {
     const shape = this.photo.aspect(given);
     if (given.height) {
       const half = (given.height / 2) * Math.max(1, shape / aspect);
-      this.use(this.orthographic);
+      this.camera = this.orthographic;
       Object.assign(this.orthographic, { top: half, bottom: -half, zoom: 1 });
       Object.assign(this.orthographic, { left: -half * aspect, right: half * aspect });
     } else {
       // The whole photograph is visible: if the view is narrower, its width decides.
       const half = Math.tan((((given.fov_y ?? 35) / 2) * Math.PI) / 180);
-      this.use(this.perspective);
+      this.camera = this.perspective;
       const angle = Math.atan(half * Math.max(1, shape / aspect));
       this.perspective.fov = (2 * angle * 180) / Math.PI;
       this.perspective.aspect = aspect;
@@ -169,7 +177,7 @@ export class Scene3D {
     const room = Math.min(1, width / height);
     polar.radius = (1.15 * radius) / Math.sin((17.5 * Math.PI) / 180) / room;
     const eye = new THREE.Vector3().setFromSpherical(polar).add(center);
-    this.use(this.perspective);
+    this.camera = this.perspective;
     this.perspective.clearViewOffset();
     this.perspective.fov = 35;
     this.place({ eye: eye.toArray() as Vec3, target: center.toArray() as Vec3, up: [0, 1, 0] });
@@ -233,12 +241,8 @@ export class Scene3D {
     return controls;
   }
 
-  private use(camera: THREE.PerspectiveCamera | THREE.OrthographicCamera): void {
-    this.camera = camera;
-  }
-
   private key(event: KeyboardEvent): void {
-    const turns: Record<string, [number, number, number]> = {
+    const steps: Record<string, [number, number, number]> = {
       ArrowLeft: [-0.1, 0, 1],
       ArrowRight: [0.1, 0, 1],
       ArrowUp: [0, -0.1, 1],
@@ -247,15 +251,16 @@ export class Scene3D {
       "=": [0, 0, 0.9],
       "-": [0, 0, 1.1],
     };
-    const turn = turns[event.key];
-    if (!turn || event.ctrlKey || event.metaKey || event.altKey) return;
+    const step = steps[event.key];
+    if (!step || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
+    event.stopPropagation();
     const away = this.camera.position.clone().sub(this.controls.target);
     const polar = new THREE.Spherical().setFromVector3(away);
-    polar.theta += turn[0];
-    polar.phi = Math.min(Math.PI - 0.01, Math.max(0.01, polar.phi + turn[1]));
-    polar.radius *= turn[2];
-    if (this.camera instanceof THREE.OrthographicCamera) this.camera.zoom /= turn[2];
+    polar.theta += step[0];
+    polar.phi = Math.min(Math.PI - 0.01, Math.max(0.01, polar.phi + step[1]));
+    polar.radius *= step[2];
+    if (this.camera instanceof THREE.OrthographicCamera) this.camera.zoom /= step[2];
     this.camera.position.setFromSpherical(polar).add(this.controls.target);
     this.camera.updateProjectionMatrix();
     this.atCamera = false;
@@ -266,7 +271,7 @@ export class Scene3D {
     this.render();
   }
 
-  /** Whether the mesh has left the view that was framed for another. */
+  /** True if the mesh has left the view that was framed for another. */
   private isElsewhere(before: THREE.Sphere): boolean {
     const { center, radius } = this.bounds();
     const far = center.distanceTo(before.center) > 0.5 * before.radius;

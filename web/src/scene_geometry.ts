@@ -1,10 +1,10 @@
 // Meshes of the protocol as three's geometries, with their colours.
 
 import * as THREE from "three";
-import { partColour, viridis } from "./colour_map";
+import { partColour, viridis, type Rgb } from "./colour_map";
 import type { Mesh } from "./protocol";
 
-/** What a mesh's colours say. */
+/** The meaning of a mesh's colours. */
 export type Paint = "plain" | "parts" | "uncertainty";
 
 /** The geometry of a mesh; the paint `parts` gives every triangle its own vertices. */
@@ -13,16 +13,20 @@ export function meshGeometry(
   paint: Paint,
   deviations: { values: Float32Array; top: number } | null,
 ): THREE.BufferGeometry {
-  if (paint === "parts" && mesh.partOf) return partsGeometry(mesh, mesh.partOf);
-  const geometry = plainGeometry(mesh);
-  const matches = deviations && deviations.values.length * 3 === mesh.positions.length;
-  if (paint === "uncertainty" && matches) {
-    const colours = new Float32Array(mesh.positions.length);
-    deviations.values.forEach((value, i) => {
-      setColour(colours, i, viridis(value / deviations.top));
-    });
-    geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
+  let geometry = ghostGeometry(mesh);
+  const partOf = paint === "parts" ? mesh.partOf : null;
+  if (paint === "uncertainty" && deviations?.values.length === mesh.positions.length / 3) {
+    const { values, top } = deviations;
+    paintVertices(geometry, (vertex) => viridis(values[vertex]! / top));
   }
+  // Meshes have their vertices twice along sharp edges, which so stay sharp.
+  if (mesh.normals) geometry.setAttribute("normal", new THREE.BufferAttribute(mesh.normals, 3));
+  else geometry.computeVertexNormals();
+  if (partOf) {
+    geometry = geometry.toNonIndexed();
+    paintVertices(geometry, (corner) => partColour(partOf[Math.floor(corner / 3)]!));
+  }
+  geometry.computeBoundingSphere();
   return geometry;
 }
 
@@ -34,30 +38,16 @@ export function ghostGeometry(mesh: Mesh): THREE.BufferGeometry {
   return geometry;
 }
 
-function plainGeometry(mesh: Mesh): THREE.BufferGeometry {
-  const geometry = ghostGeometry(mesh);
-  if (mesh.normals) geometry.setAttribute("normal", new THREE.BufferAttribute(mesh.normals, 3));
-  else geometry.computeVertexNormals();
-  geometry.computeBoundingSphere();
-  return geometry;
-}
-
-function partsGeometry(mesh: Mesh, partOf: Uint16Array): THREE.BufferGeometry {
-  const geometry = plainGeometry(mesh).toNonIndexed();
-  const colours = new Float32Array(3 * mesh.corners.length);
-  partOf.forEach((part, triangle) => {
-    const colour = partColour(part);
-    for (let k = 0; k < 3; k++) setColour(colours, 3 * triangle + k, colour);
-  });
-  geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
-  geometry.computeBoundingSphere();
-  return geometry;
-}
-
 const linear = new THREE.Color();
 
 // Colours of vertices are linear, those of the map are as screens show them.
-function setColour(colours: Float32Array, vertex: number, [r, g, b]: number[]): void {
-  linear.setRGB(r! / 255, g! / 255, b! / 255, THREE.SRGBColorSpace);
-  linear.toArray(colours, 3 * vertex);
+function paintVertices(geometry: THREE.BufferGeometry, colour: (vertex: number) => Rgb): void {
+  const { count } = geometry.getAttribute("position");
+  const colours = new Float32Array(3 * count);
+  for (let vertex = 0; vertex < count; vertex++) {
+    const [r, g, b] = colour(vertex);
+    linear.setRGB(r / 255, g / 255, b / 255, THREE.SRGBColorSpace);
+    linear.toArray(colours, 3 * vertex);
+  }
+  geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
 }

@@ -4,7 +4,7 @@ import type { Actions } from "./actions";
 import { button, h, Segments, select } from "./dom";
 import { ErrorBox } from "./errors";
 import { hasBest } from "./protocol";
-import { SocketSource } from "./socket_source";
+import { StudioData } from "./studio_data";
 import type { View } from "./store";
 import { Viewer } from "./viewer";
 
@@ -88,32 +88,32 @@ export class ScenePanel {
     }
     this.showNote();
     if (!known.connected) return;
-    const source = new SocketSource(connection, known);
-    // What is shown is asked for again only when it changed, not whenever anything is known.
+    const data = new StudioData(connection, known);
+    // Pictures are asked for again only when the state changed, not whenever anything is known.
     const revision = known.view === "session" ? known.session?.revision : run?.revision;
     const moving = known.view === "session" || known.view === "best";
     const shown = JSON.stringify([
-      source.key,
-      moving ? revision : source.frames.length,
-      source.frames.length,
+      data.key,
+      moving ? revision : data.frames.length,
+      data.frames.length,
       // Ghosts are a sample of the draws: twice as many make another sample worth its price.
-      Math.floor(Math.log2(source.drawCount + 1)),
+      Math.floor(Math.log2(data.drawCount + 1)),
     ]);
     if (shown === this.shown) {
       if (known.at !== null && known.at !== this.viewer.current) this.viewer.setFrame(known.at);
       return;
     }
-    const same = source.key === this.key;
-    this.key = source.key;
+    const same = data.key === this.key;
+    this.key = data.key;
     this.shown = shown;
     // While a choice is dragged its own answers bring the pictures.
     if (known.dragging && moving && same) return;
-    this.viewer.setSource(source, known.at ?? 0);
+    this.viewer.setData(data, known.at ?? 0);
   }
 
   private showNote(): void {
     const { session, view } = this.actions.store.now;
-    // What a session says when it is opened; its log joint is shown elsewhere.
+    // The session's note from when it was opened; its log joint is shown elsewhere.
     const lines = (session?.note ?? "").split("\n").filter((line) => !/^log joint/.test(line));
     const note = view === "session" ? lines.join("\n").trim().replace(/^note: /, "") : "";
     this.note.textContent = note;

@@ -1,4 +1,4 @@
-// What is known of the selected choice, its control, and what can be done with it.
+// The selected choice: its statistics, its control, and its buttons.
 
 import { ChoiceControl, type Change } from "./choice_control";
 import { button, fill, h, number } from "./dom";

@@ -7,7 +7,7 @@ import { Latest } from "./latest";
 import type { Mesh } from "./protocol";
 import { Scene3D } from "./scene3d";
 import type { Paint } from "./scene_geometry";
-import type { Source } from "./source";
+import type { ViewerData } from "./viewer_data";
 import { evenly, Spread } from "./uncertainty";
 
 const GHOSTS = 12;
@@ -21,15 +21,18 @@ export class SpaceView {
   onTurn: () => void = () => {};
 
   private scene: Scene3D | null = null;
-  private source: Source | null = null;
+  private data: ViewerData | null = null;
   private frame = 0;
   private mesh: Mesh | null = null;
   private photoOf: string | null = null;
+  private ghostsOf = "";
   private spread: Spread | null = null;
   private readonly error = new ErrorBox();
   private readonly legend = h("div", { class: "legend", hidden: true });
   private readonly home: HTMLButtonElement;
   private readonly ghostToggle: HTMLButtonElement;
+  private readonly photoToggle: HTMLButtonElement;
+  private readonly paint: HTMLSelectElement;
   private readonly meshes = new Latest<void>(() => this.loadMesh(), (e) => this.fail(e));
   private readonly photos = new Latest<void>(() => this.loadPhoto(), (e) => this.fail(e));
   private readonly ghosts = new Latest<void>(() => this.loadGhosts(), (e) => this.fail(e));
@@ -49,7 +52,7 @@ export class SpaceView {
       ["parts", "Parts"],
       ["uncertainty", "Uncertainty"],
     ];
-    const paint = select(paints, "plain", (value) => this.setPaint(value as Paint), {
+    this.paint = select(paints, "plain", (value) => this.setPaint(value as Paint), {
       "aria-label": "Colours of the surface",
     });
     const opacity = h("input", {
@@ -64,16 +67,16 @@ export class SpaceView {
     });
     opacity.addEventListener("input", () => this.look({ opacity: Number(opacity.value) }));
     const showPhoto = (on: boolean) => this.look({ photo: on });
-    const photo = this.toggle("Photo", "The photograph behind the scene", showPhoto, true);
+    this.photoToggle = this.toggle("Photo", "The photograph behind the scene", showPhoto, true);
     this.tools = h(
       "div",
       { class: "tools" },
       this.home,
       button("Whole", () => this.scene?.reset(), { title: "Look at the whole scene" }),
-      paint,
+      this.paint,
       this.ghostToggle,
       this.toggle("Wire", "The triangles' edges only", (on) => this.look({ wireframe: on })),
-      photo,
+      this.photoToggle,
       opacity,
     );
     this.element.append(this.legend, this.error.element);
@@ -91,18 +94,20 @@ export class SpaceView {
     }
   }
 
-  /** Shows frames of another source. */
-  setSource(source: Source | null): void {
-    const other = source?.key !== this.source?.key;
-    this.source = source;
-    this.ghostToggle.disabled = !source || source.drawCount === 0;
+  /** Shows frames of other data. */
+  setData(data: ViewerData | null): void {
+    const other = data?.key !== this.data?.key;
+    this.data = data;
+    this.ghostToggle.disabled = !data?.drawCount;
+    this.ghostToggle.hidden = this.paint.hidden = data?.drawCount === null;
+    this.photoToggle.hidden = data?.photoKey === null;
     if (!other) return;
     this.spread = null;
     this.legend.hidden = true;
     this.scene?.setDeviations(null);
     this.scene?.setGhosts([]);
     this.ghostsOf = "";
-    if (source && source.frames.length > 0) return;
+    if (data && data.frames.length > 0) return;
     this.scene?.clear();
     this.photoOf = null;
   }
@@ -111,7 +116,18 @@ export class SpaceView {
   ask(frame: number): void {
     this.frame = frame;
     const visible = this.element.offsetParent && document.visibilityState === "visible";
-    if (this.scene && this.source && visible) this.meshes.call();
+    if (this.scene && this.data && visible) this.meshes.call();
+  }
+
+  /** False if the browser offers no WebGL. */
+  get works(): boolean {
+    return this.scene !== null;
+  }
+
+  /** Gives the view's context for drawing back to the browser. */
+  dispose(): void {
+    this.scene?.dispose();
+    this.scene = null;
   }
 
   /** The present camera of the view. */
@@ -142,13 +158,14 @@ export class SpaceView {
   }
 
   private async loadMesh(): Promise<void> {
-    const { source, scene, frame } = this;
-    if (!source || !scene || frame >= source.frames.length) return;
-    const [mesh, camera] = await Promise.all([source.mesh(frame), source.camera(frame)]);
-    if (source.key !== this.source?.key) return;
+    const { data, scene, frame } = this;
+    if (!data || !scene || frame >= data.frames.length) return;
+    const [mesh, camera] = await Promise.all([data.mesh(frame), data.camera(frame)]);
+    if (data.key !== this.data?.key) return;
     this.error.clear();
     this.mesh = mesh;
     this.photos.call();
+    this.home.hidden = camera === null;
     scene.setCamera(camera);
     scene.setMesh(mesh);
     if (scene.look.paint === "parts") this.showParts();
@@ -160,11 +177,11 @@ export class SpaceView {
 
   /** Loads the photograph beside the meshes, which do not wait for it. */
   private async loadPhoto(): Promise<void> {
-    const { source, scene } = this;
-    if (!source || !scene || this.photoOf === source.photoKey) return;
-    const key = source.photoKey;
-    const picture = key === null ? null : await source.photo();
-    if (key !== this.source?.photoKey) return;
+    const { data, scene } = this;
+    if (!data || !scene || this.photoOf === data.photoKey) return;
+    const key = data.photoKey;
+    const picture = key === null ? null : await data.photo();
+    if (key !== this.data?.photoKey) return;
     this.photoOf = key;
     if (!picture) {
       scene.setPhoto(null);
@@ -177,36 +194,34 @@ export class SpaceView {
     scene.setPhoto(image);
   }
 
-  private ghostsOf = "";
-
   private async loadGhosts(): Promise<void> {
-    const { source, scene } = this;
-    if (!source || !scene) return;
-    // Few draws more than before do not change the sample enough to load it again.
-    const key = `${source.key} ${Math.floor(Math.log2(source.drawCount + 1) * 2)}`;
-    if (key === this.ghostsOf && source.drawCount > 0) return;
+    const { data, scene } = this;
+    if (!data?.drawCount || !scene) return;
+    // Some draws more than before do not change the sample enough to load it again.
+    const key = `${data.key} ${Math.floor(Math.log2(data.drawCount + 1) * 2)}`;
+    if (key === this.ghostsOf) return;
     const meshes: Mesh[] = [];
-    for (const draw of evenly(source.drawCount, GHOSTS)) {
-      meshes.push(await source.drawMesh(draw));
-      if (source.key !== this.source?.key) return;
+    for (const draw of evenly(data.drawCount, GHOSTS)) {
+      meshes.push(await data.drawMesh(draw));
+      if (data.key !== this.data?.key) return;
     }
     this.ghostsOf = key;
     scene.setGhosts(meshes);
   }
 
   private async loadSpread(): Promise<void> {
-    const { source, scene, mesh } = this;
-    if (!source || !scene || !mesh) return;
-    if (source.drawCount < 2) {
+    const { data, scene, mesh } = this;
+    if (!data || !scene || !mesh) return;
+    if (!data.drawCount || data.drawCount < 2) {
       this.showLegend("The uncertainty needs draws: look at a run that has some.");
       return;
     }
     const spread = new Spread(mesh.topology, mesh.positions.length);
-    const draws = evenly(source.drawCount, DRAWS_FOR_SPREAD);
+    const draws = evenly(data.drawCount, DRAWS_FOR_SPREAD);
     for (const [i, draw] of draws.entries()) {
       this.showLegend(`Loading draw ${i + 1} of ${draws.length} …`);
-      spread.add(await source.drawMesh(draw));
-      if (source.key !== this.source?.key || scene.look.paint !== "uncertainty") return;
+      spread.add(await data.drawMesh(draw));
+      if (data.key !== this.data?.key || scene.look.paint !== "uncertainty") return;
     }
     this.spread = spread;
     if (spread.draws < 2) {

@@ -1,25 +1,40 @@
-// Which state is shown, of the session or of the run that is looked at.
+// The states that the studio shows, of the session or of the run that is looked at.
 
 import { hasBest, type State } from "./protocol";
 import type { Known } from "./store";
+import type { Frame } from "./viewer_data";
 
-/** The state that the viewer shows at present. */
-export function stateOf(known: Readonly<Known>): State | null {
-  const { view, at, run, session, draws, modes } = known;
-  if (view === "session") return session ? { session: session.session } : null;
-  if (run === null) return null;
-  const within = (total: number) => (total > 0 ? Math.min(at ?? 0, total - 1) : null);
-  if (view === "draws") {
-    const draw = within(draws?.draws.length ?? 0);
-    return draw === null ? null : { run, draw };
+/** The states of the chosen view, each with its place on the viewer's slider. */
+export function statesOf(known: Readonly<Known>): [Frame, State][] {
+  const { view, run, session, draws, modes } = known;
+  const plain = (label: string, logJoint: number | null = null): Frame => {
+    return { label, chain: null, logJoint };
+  };
+  const several = (total: number, make: (i: number) => [Frame, State]) => {
+    return Array.from({ length: total }, (_, i) => make(i));
+  };
+  if (view === "session") {
+    if (!session) return [];
+    return [[plain("The session's state", session.log_joint), { session: session.session }]];
   }
+  if (run === null) return [];
   if (view === "film") {
-    const film = within(draws?.film ?? 0);
-    return film === null ? null : { run, film };
+    return several(draws?.film ?? 0, (film) => [plain("From prior to posterior"), { run, film }]);
   }
-  if (view === "modes") {
-    const mode = within(modes);
-    return mode === null ? null : { run, mode };
+  if (view === "modes") return several(modes, (mode) => [plain(`Mode ${mode + 1}`), { run, mode }]);
+  if (view === "draws") {
+    return (draws?.draws ?? []).map((d, draw) => [
+      { label: `Chain ${d.chain}, draw ${d.draw}`, chain: d.chain, logJoint: d.log_joint },
+      { run, draw },
+    ]);
   }
-  return hasBest(known.runs.find((r) => r.run === run) ?? null) ? { run } : null;
+  // A run that just began, or failed, has no state yet.
+  const current = known.runs.find((r) => r.run === run) ?? null;
+  return hasBest(current) ? [[plain("The best state so far"), { run }]] : [];
+}
+
+/** The state that is shown at present. */
+export function stateOf(known: Readonly<Known>): State | null {
+  const states = statesOf(known);
+  return states[Math.min(known.at ?? 0, states.length - 1)]?.[1] ?? null;
 }

@@ -1,15 +1,13 @@
-// What the page knows, and who wants to hear of changes. Panels read from here and never from
+// The state of the page, and the listeners to its changes. Panels read from here and never from
 // each other.
 
 import type { Draws, Folder, Run, Session } from "./protocol";
 
-/** Which states the viewer shows. */
+/** The states that the viewer shows. */
 export type View = "session" | "best" | "draws" | "film" | "modes";
 
 export interface Known {
   connected: boolean;
-  /** Whether a connection was ever made: before that no banner is shown. */
-  wasConnected: boolean;
   folder: Folder | null;
   session: Session | null;
   /** All runs of the folder, newest last. */
@@ -34,7 +32,6 @@ type Listener = () => void;
 export class Store {
   private known: Known = {
     connected: false,
-    wasConnected: false,
     folder: null,
     session: null,
     runs: [],

@@ -138,8 +138,8 @@ export class TopBar {
   }
 }
 
-/** What is said of a run in one line. */
-export function statusOf(run: Run): (HTMLElement | string)[] {
+/** The state of a run in one line. */
+function statusOf(run: Run): (HTMLElement | string)[] {
   const state = run.state === "running" ? (run.phase ?? "running") : run.state;
   const times = [duration(run.elapsed)];
   if (run.left !== null && run.state === "running") times.push(`${duration(run.left)} left`);

@@ -2,10 +2,10 @@
 
 import type { Actions } from "./actions";
 import { buildTree, passes, visibleRows, type Node, type Row } from "./address_tree";
-import { button, fill, h, number } from "./dom";
-import { ErrorBox } from "./errors";
+import { button, fill, filterField, h, number } from "./dom";
 import { Latest } from "./latest";
 import { wholeChoice, type Choices, type Densities, type State, type Value } from "./protocol";
+import { Panel } from "./panel";
 import { SelectedChoice } from "./selected_choice";
 import { stateOf } from "./states";
 import { VirtualList } from "./virtual_list";
@@ -13,7 +13,7 @@ import { VirtualList } from "./virtual_list";
 const ROW = 26;
 
 /** A value that a choice shall have. */
-interface Wish {
+interface Assignment {
   address: string;
   value: Value;
   last: boolean;
@@ -21,7 +21,7 @@ interface Wish {
 }
 
 /** The tree of choices. */
-export class TracePanel {
+export class TracePanel extends Panel {
   readonly element: HTMLElement;
   /** Called with each answered change while a choice is dragged, and after it. */
   onMoved: (coarse: boolean) => void = () => {};
@@ -31,26 +31,19 @@ export class TracePanel {
   private opened = new Set<string>();
   private selected: string | null = null;
   private words: string[] = [];
-  private readonly error = new ErrorBox();
   private readonly joint = h("div", { class: "joint" });
   private readonly observed = h("details", { class: "observed", hidden: true });
   private readonly list: VirtualList;
   private readonly selection: SelectedChoice;
   private readonly undo = button("Undo", () => this.enter(":undo"));
   private readonly redo = button("Redo", () => this.enter(":redo"));
-  private readonly reads = new Latest<void>(() => this.read(), (e) => this.error.show(e));
-  private readonly assigns: Latest<Wish>;
-  private visible = false;
+  private readonly assigns: Latest<Assignment>;
 
-  constructor(private readonly actions: Actions) {
-    const { store } = actions;
-    const filter = h("input", {
-      type: "search",
-      placeholder: "Filter: part of an address, $tag, family",
-      "aria-label": "Filter choices",
-    });
-    filter.addEventListener("input", () => {
-      this.words = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
+  constructor(actions: Actions) {
+    super(actions, ["session", "view", "at", "run", "runs", "draws", "modes"]);
+    const hint = "Filter: part of an address, $tag, family";
+    const filter = filterField("Filter choices", hint, (words) => {
+      this.words = words;
       this.rebuild();
     });
     this.list = new VirtualList(ROW, (i) => this.line(this.rows[i]!, i));
@@ -82,34 +75,22 @@ export class TracePanel {
       this.observed,
       this.selection.element,
     );
-    this.assigns = new Latest((wish) => this.send(wish), (e) => this.failAssign(e));
-    store.on(["session", "view", "at", "run", "runs", "draws", "modes"], () => this.ask());
-    store.on(["session", "view"], () => this.showHistory());
+    this.assigns = new Latest((assignment) => this.send(assignment), (e) => this.failAssign(e));
+    actions.store.on(["session", "view"], () => this.showHistory());
     this.showHistory();
   }
 
-  /** The tab is shown, or no longer. */
-  setVisible(visible: boolean): void {
-    this.visible = visible;
-    if (visible) this.ask();
-  }
-
-  private askedFor = "";
-
-  private ask(): void {
+  protected show(): void {
     const { store } = this.actions;
-    if (!this.visible || store.now.dragging) return;
+    if (store.now.dragging) return;
     const state = stateOf(store.now);
     const revision = state?.session
       ? store.now.session?.revision
       : store.now.view === "best" && store.currentRun?.revision;
-    const key = JSON.stringify([state, revision]);
-    if (key === this.askedFor) return;
-    this.askedFor = key;
-    this.reads.call();
+    if (this.isNew(JSON.stringify([state, revision]))) this.reads.call();
   }
 
-  private async read(): Promise<void> {
+  protected async read(): Promise<void> {
     const state = stateOf(this.actions.store.now);
     if (!state) {
       this.data = null;
@@ -279,7 +260,7 @@ export class TracePanel {
     this.assigns.call({ address: this.selected, value, ...move });
   }
 
-  private async send({ address, value, drag, last }: Wish): Promise<void> {
+  private async send({ address, value, drag, last }: Assignment): Promise<void> {
     const { store, connection } = this.actions;
     const session = store.now.session;
     if (!session) return;
@@ -312,9 +293,9 @@ export class TracePanel {
   private endDrag(): void {
     this.selection.stop();
     this.actions.store.set({ dragging: false });
-    this.askedFor = "";
+    this.isNew("");
     this.actions.refreshSession();
-    this.ask();
+    this.follow();
   }
 
   private enter(text: string): void {

@@ -1,20 +1,20 @@
 // The viewer: a frame's picture and its mesh side by side, and a slider over the frames. The
-// studio and the report both use it; only their sources differ.
+// studio, the report and the notebook all use it; only their data differ.
 
 import { button, fill, h, number, Segments, select, setOptions } from "./dom";
 import { PictureView } from "./picture_view";
-import type { Source } from "./source";
+import type { ViewerData } from "./viewer_data";
 import { SpaceView } from "./space_view";
 
 const FRAMES_A_SECOND = 6;
 
-/** Shows the frames of a source. */
+/** Shows frames. */
 export class Viewer {
   readonly element: HTMLElement;
   /** Called when the user moved the slider. */
   onFrame: (frame: number) => void = () => {};
 
-  private source: Source | null = null;
+  private data: ViewerData | null = null;
   private frame = 0;
   private playing: ReturnType<typeof setTimeout> | null = null;
   private readonly pictures = new PictureView();
@@ -28,6 +28,8 @@ export class Viewer {
     "aria-label": "Chain",
   });
   private readonly bar: HTMLElement;
+  private readonly seen = () => this.refresh();
+  private arranged = "";
 
   /** `before` is put in front of the viewer's own controls. */
   constructor(...before: HTMLElement[]) {
@@ -68,36 +70,47 @@ export class Viewer {
     this.pictures.viewOf3D = () => this.space.viewpoint();
     this.space.onTurn = () => this.pictures.turned();
     new ResizeObserver(() => this.arrange()).observe(this.panes);
-    document.addEventListener("visibilitychange", () => this.refresh());
-    this.setSource(null);
+    document.addEventListener("visibilitychange", this.seen);
+    this.setData(null);
   }
 
-  /** Shows a source, from the given frame. */
-  setSource(source: Source | null, frame = 0): void {
-    if (source?.key !== this.source?.key) this.stop();
-    this.source = source;
-    this.pictures.setSource(source);
-    this.space.setSource(source);
-    const chains = [...new Set((source?.frames ?? []).map((f) => f.chain))]
+  /** False if the browser offers no WebGL. */
+  get has3D(): boolean {
+    return this.space.works;
+  }
+
+  /** Ends the viewer; the browser has few contexts for drawing in 3D. */
+  dispose(): void {
+    this.stop();
+    document.removeEventListener("visibilitychange", this.seen);
+    this.space.dispose();
+  }
+
+  /** Shows data, from the given frame. */
+  setData(data: ViewerData | null, frame = 0): void {
+    if (data?.key !== this.data?.key) this.stop();
+    this.data = data;
+    this.pictures.setData(data);
+    this.space.setData(data);
+    const chains = [...new Set((data?.frames ?? []).map((f) => f.chain))]
       .filter((c): c is number => c !== null)
       .sort((a, b) => a - b);
     const options = chains.map((c) => [String(c), `Chain ${c}`] as [string, string]);
     setOptions(this.chains, [["all", "All chains"], ...options], this.chains.value || "all");
     if (this.chains.selectedIndex < 0) this.chains.value = "all";
     this.chains.hidden = chains.length < 2;
-    this.bar.hidden = (source?.frames.length ?? 0) < 2;
-    const hasPictures = source === null || source.layers.length > 0;
-    this.layout.enable("picture", hasPictures);
-    this.layout.enable("both", hasPictures);
+    this.bar.hidden = (data?.frames.length ?? 0) < 2;
+    const hasPictures = data === null || data.layers.length > 0;
+    this.layout.element.hidden = !hasPictures;
     if (!hasPictures) this.layout.value = "space";
     this.arrange();
     this.setFrame(frame);
   }
 
-  /** The source's frames were replaced by longer lists of the same states, or by other states
+  /** The frames were replaced by longer lists of the same states, or by other states
    * in the same places: shows them again, coarsely at first while a choice is dragged. */
   refresh(coarse = false): void {
-    if (!this.source) return;
+    if (!this.data) return;
     this.pictures.ask(this.frame, coarse);
     this.space.ask(this.frame);
   }
@@ -126,7 +139,7 @@ export class Viewer {
   }
 
   private describe(place: number, total: number): void {
-    const frame = this.source?.frames[this.frame];
+    const frame = this.data?.frames[this.frame];
     fill(this.label, frame ? `${frame.label}` : "");
     if (!frame) return;
     this.slider.setAttribute("aria-valuetext", `${frame.label}, ${place + 1} of ${total}`);
@@ -136,7 +149,7 @@ export class Viewer {
 
   /** The frames of the chosen chain. */
   private allowed(): number[] {
-    const frames = this.source?.frames ?? [];
+    const frames = this.data?.frames ?? [];
     const chain = this.chains.value;
     const all = frames.map((_, i) => i);
     if (chain === "all" || chain === "") return all;
@@ -184,12 +197,14 @@ export class Viewer {
   private arrange(): void {
     const [picture, space] = this.panes.children as unknown as [HTMLElement, HTMLElement];
     const layout = this.layout.value;
-    const before = `${picture.hidden} ${space.hidden}`;
     picture.hidden = layout === "space";
     space.hidden = layout === "picture";
-    const changed = before !== `${picture.hidden} ${space.hidden}`;
     const { clientWidth, clientHeight } = this.panes;
     this.panes.classList.toggle("side-by-side", clientWidth > 1.1 * clientHeight);
-    if (changed) this.refresh();
+    // A hidden view asks for nothing, nor does a viewer that is not yet in its page.
+    const arranged = `${layout} ${clientWidth > 0}`;
+    if (arranged === this.arranged) return;
+    this.arranged = arranged;
+    this.refresh();
   }
 }

@@ -3,10 +3,9 @@
 import assert from "node:assert/strict";
 import { readdirSync, readFileSync } from "node:fs";
 import test from "node:test";
-import { Tokenizer, type Grammar, type Region } from "../src/grammar";
-
-const file = new URL("../../editors/vscode/syntaxes/pcad.tmLanguage.json", import.meta.url);
-const tokenizer = new Tokenizer(JSON.parse(readFileSync(file, "utf8")) as Grammar);
+import { cellTokens, COLOURS } from "../src/cell_colours";
+import type { Region } from "../src/grammar";
+import { kindOf, streamMode, tokenizer } from "../src/tokens";
 
 function scopes(line: string, region: Region = null): [string, string][] {
   return tokenizer.line(line, region).tokens.map(({ from, to, scope }) => {
@@ -44,6 +43,47 @@ test("a block comment goes on over lines", () => {
   assert.equal(second.region, null);
   assert.equal(second.tokens[0]!.scope, "comment.block.pcad");
   assert.ok(second.tokens.some((t) => t.scope === "keyword.other.pcad"));
+});
+
+test("a mode of CodeMirror names the kinds of tokens, over lines", () => {
+  const mode = streamMode((kind) => COLOURS[kind][0]);
+  const state = mode.startState();
+  const styles = (string: string) => {
+    const stream = { string, pos: 0 };
+    const found: [string, string][] = [];
+    while (stream.pos < string.length) {
+      const from = stream.pos;
+      const style = mode.token(stream, state);
+      if (style) found.push([string.slice(from, stream.pos), style]);
+    }
+    return found;
+  };
+  assert.deepEqual(styles("let a = f(@b); /* c"), [
+    ["let", "keyword"],
+    ["a", "variable"],
+    ["=", "operator"],
+    ["f", "def"],
+    ["@b", "attribute"],
+    ["/*", "comment"],
+    [" c", "comment"],
+  ]);
+  assert.deepEqual(styles("d */ 1")[0], ["d */", "comment"]);
+});
+
+test("cells of notebooks have colours below their first line", () => {
+  const tokens = cellTokens(["%%pcad line", "assume m ~ normal(0, 1);", 'let s = "', '";']);
+  const first = tokens[0]!;
+  assert.deepEqual(first, { kind: "keyword", line: 1, from: 0, to: 6 });
+  assert.ok(tokens.every(({ line }) => line > 0));
+  assert.ok(tokens.some(({ kind, line }) => kind === "string" && line === 2));
+  assert.deepEqual(cellTokens(["import pcadlang"]), []);
+});
+
+test("every scope of the grammar has a colour", () => {
+  const file = new URL("../../editors/vscode/syntaxes/pcad.tmLanguage.json", import.meta.url);
+  const names = [...readFileSync(file, "utf8").matchAll(/"name": "([a-z.-]+\.[a-z.-]+)"/g)];
+  assert.ok(names.length > 8);
+  for (const [, name] of names) assert.ok(kindOf(name!) ?? name!.startsWith("punctuation"), name);
 });
 
 test("every shipped program is tokenized to its end, tokens in order", () => {

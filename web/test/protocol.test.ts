@@ -3,18 +3,10 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { readFrame, readMesh } from "../src/protocol";
-
-function frame(header: object, data: Uint8Array): ArrayBuffer {
-  const text = new TextEncoder().encode(JSON.stringify(header));
-  const bytes = new Uint8Array(4 + text.length + data.length);
-  new DataView(bytes.buffer).setUint32(0, text.length, true);
-  bytes.set(text, 4);
-  bytes.set(data, 4 + text.length);
-  return bytes.buffer;
-}
+import { frame } from "./frames";
 
 test("a frame is a header and data", () => {
-  const { header, data } = readFrame(frame({ id: 7, type: "image/png" }, Uint8Array.of(1, 2)));
+  const { header, data } = frame({ id: 7, type: "image/png" }, Uint8Array.of(1, 2));
   assert.equal(header.id, 7);
   assert.deepEqual([...data], [1, 2]);
 });
@@ -27,7 +19,7 @@ test("a mesh is read wherever its header ends", () => {
   const data = new Uint8Array(parts.flatMap((p) => [...new Uint8Array(p.buffer)]));
   for (const padding of ["", "a", "ab", "abc"]) {
     const header = { id: 1, type: "mesh", vertices: 3, triangles: 1, topology: "k", padding };
-    const mesh = readMesh(readFrame(frame(header, data)));
+    const mesh = readMesh(frame(header, data));
     assert.deepEqual([...mesh.positions], [...positions]);
     assert.deepEqual([...mesh.normals!], [...normals]);
     assert.deepEqual([...mesh.corners], [0, 1, 2]);
@@ -38,5 +30,5 @@ test("a mesh is read wherever its header ends", () => {
 test("what is too short is an error, not a wrong mesh", () => {
   assert.throws(() => readFrame(new ArrayBuffer(2)), /shorter/);
   const header = { id: 1, type: "mesh", vertices: 9, triangles: 1 };
-  assert.throws(() => readMesh(readFrame(frame(header, new Uint8Array(8)))), /9 vertices/);
+  assert.throws(() => readMesh(frame(header, new Uint8Array(8))), /9 vertices/);
 });

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { buildTree, passes, splitAddress, visibleRows } from "../src/address_tree";
-import { fewValues, sliderRange } from "../src/choice_control";
+import { discreteValues, sliderRange } from "../src/choice_control";
 import { readPlace, writePlace } from "../src/fragment";
 import { ranks } from "../src/plot_data";
 import { byteLength, charOffset, isOpen } from "../src/prompt_panel";
@@ -58,11 +58,11 @@ test("a slider spans the support, or four scales around the value", () => {
   assert.deepEqual(sliderRange(choice("@a", { low: 0, scale: 1 }), 3), [0, 7]);
 });
 
-test("few values have buttons", () => {
-  assert.deepEqual(fewValues(choice("@a", { value: true })), [false, true]);
+test("discrete values have buttons", () => {
+  assert.deepEqual(discreteValues(choice("@a", { value: true })), [false, true]);
   const words = choice("@a", { value: "x", support: 'one of "x", "y"' });
-  assert.deepEqual(fewValues(words), ["x", "y"]);
-  assert.equal(fewValues(choice("@a")), null);
+  assert.deepEqual(discreteValues(words), ["x", "y"]);
+  assert.equal(discreteValues(choice("@a")), null);
 });
 
 test("the address keeps what is open", () => {

@@ -123,7 +123,7 @@ fn differences(mesh: &Mesh, low: glam::DVec3, high: glam::DVec3) -> Vec<u8> {
 }
 
 /// Compresses bytes (zlib, RFC 1950) and writes them in base64.
-fn packed(bytes: &[u8]) -> String {
+pub(crate) fn packed(bytes: &[u8]) -> String {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
     // Writing to memory does not fail.
     let _ = encoder.write_all(bytes);
@@ -131,7 +131,7 @@ fn packed(bytes: &[u8]) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use glam::{DVec3, Vec3};
     use pcadlang_scene::geom::{Affine, sphere};
@@ -144,7 +144,7 @@ mod tests {
         EmbeddedDraw { chain: Some(1), draw: Some(3), log_joint: -x, label: None, solid }
     }
 
-    fn unpacked(v: &Value) -> Vec<u8> {
+    pub(crate) fn unpacked(v: &Value) -> Vec<u8> {
         let bytes = BASE64_STANDARD.decode(v.as_str().unwrap()).unwrap();
         let mut out = Vec::new();
         flate2::read::ZlibDecoder::new(&bytes[..]).read_to_end(&mut out).unwrap();

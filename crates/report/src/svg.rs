@@ -1,4 +1,4 @@
-//! Writes SVG: the plots of `report.html`, of `pcadlang tradeoff`, and of the examples.
+//! Writes SVG: the plots of `pcadlang tradeoff` and of the examples.
 //!
 //! Points are in pixels from the left and from the top, written to a tenth. A `style` is
 //! the attributes of an element as they are written. Texts are escaped.
@@ -10,11 +10,6 @@ use std::fmt::Write;
 #[derive(Clone, Debug)]
 pub struct Svg(String);
 
-/// Returns the size of a picture as attributes.
-fn size(width: f64, height: f64) -> String {
-    format!("viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\"")
-}
-
 /// Returns points as the attribute of a line or an area.
 fn list(points: impl IntoIterator<Item = (f64, f64)>) -> String {
     let each: Vec<String> = points.into_iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
@@ -25,16 +20,10 @@ impl Svg {
     /// Starts a file of its own: black on white.
     pub fn file(width: f64, height: f64) -> Svg {
         Svg(format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" {} font-family=\"system-ui, sans-serif\" \
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
+             width=\"{width}\" height=\"{height}\" font-family=\"system-ui, sans-serif\" \
              font-size=\"12\"><rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\n",
-            size(width, height)
         ))
-    }
-
-    /// Starts a picture within a page, which has the style.
-    pub fn inline(width: f64, height: f64, title: &str) -> Svg {
-        let (size, title) = (size(width, height), escaped(title));
-        Svg(format!("<svg {size} role=\"img\"><title>{title}</title>\n"))
     }
 
     /// Adds an element with a title that is shown at the pointer; no title if it is empty.
@@ -48,12 +37,6 @@ impl Svg {
                 escaped(title)
             ),
         };
-    }
-
-    /// Adds a rectangle at the top left.
-    pub fn field(&mut self, width: f64, height: f64, style: &str) {
-        let attributes = format!("width=\"{width}\" height=\"{height}\"");
-        self.element("rect", &attributes, style, "");
     }
 
     /// Adds a line through points.
@@ -117,7 +100,5 @@ mod tests {
             "</svg>\n",
         ];
         assert_eq!(rest, lines.join("\n"));
-        let page = Svg::inline(1.0, 2.0, "it's").end();
-        assert!(page.contains("<title>it&#39;s</title>") && !page.contains("http"));
     }
 }

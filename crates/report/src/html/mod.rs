@@ -127,13 +127,14 @@ fn draws(quantities: &[Quantity]) -> String {
         return s;
     }
     s.push_str(
-        "<p class=\"note\">One colour per chain. First: trace plot. Second: density. Third: rank plot, flat if the chains agree.</p>\n",
+        "<p class=\"note\">One colour per chain. First: trace plot; drag to enlarge a part. Second: density. Third: rank plot, flat if the chains agree.</p>\n",
     );
-    for (i, q) in quantities.iter().take(PLOTTED).enumerate() {
-        let (a, b, c) = (plots::traces(q), plots::marginal(q), plots::ranks(q));
+    let plotted = &quantities[..quantities.len().min(PLOTTED)];
+    for (i, q) in plotted.iter().enumerate() {
         let name = encode::breakable(&q.name);
-        let _ = writeln!(s, "<div class=\"plots\" id=\"q{i}\"><b>{name}</b>{a}{b}{c}</div>");
+        let _ = writeln!(s, "<div class=\"plots\" id=\"q{i}\"><b>{name}</b></div>");
     }
+    s.push_str(&plots::scripts(plotted));
     if let Some(more) = quantities.len().checked_sub(PLOTTED + 1) {
         let _ = writeln!(s, "<p class=\"note\">… and {} more, in the draw files.</p>", more + 1);
     }

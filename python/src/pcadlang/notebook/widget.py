@@ -39,7 +39,7 @@ def picture(solid: Solid) -> NDArray[np.uint8]:
 
 
 def script() -> str:
-    """What draws the mesh in the page."""
+    """What draws the mesh in the page; `web/src/notebook.ts` is its source."""
     return files("pcadlang.notebook").joinpath("widget.js").read_text(encoding="utf-8")
 
 
@@ -54,7 +54,7 @@ def widget_class() -> Any:
     traitlets: Any = import_module("traitlets")
 
     class SolidWidget(anywidget.AnyWidget):  # type: ignore[misc]
-        """A mesh that can be turned by dragging and zoomed by the wheel. It needs no network."""
+        """A mesh in the viewer of the studio and of reports. It needs no network."""
 
         _esm = script()
         vertices = traitlets.Bytes().tag(sync=True)

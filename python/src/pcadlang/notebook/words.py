@@ -1,4 +1,4 @@
-"""The words of the language, for the lexer of outputs and for the colours of cells."""
+"""The words of the language, for the lexer of outputs."""
 
 DECLARATIONS = [
     "include",
@@ -40,7 +40,6 @@ CONTROL = [
 OPERATORS = ["or", "and", "not"]
 CONSTANTS = ["true", "false"]
 
-# Regular expressions that Python and JavaScript read alike.
 SEGMENT = r"[A-Za-z_*][A-Za-z0-9_*]*(?:#[0-9]+)?(?:\[[^\]]*\])*"
 ADDRESS = rf"@{SEGMENT}(?:/{SEGMENT})*"
 TAG = r"[#$][A-Za-z_][A-Za-z0-9_]*(?::[A-Za-z_][A-Za-z0-9_]*)?"

@@ -1,29 +1,15 @@
-// What the studio's viewer shows: states of the session or of the run that is looked at.
+// The data of the studio's viewer: states of the session or of the run that is looked at.
 
 import type { Connection } from "./connection";
-import type { Camera, Mesh, State } from "./protocol";
-import { hasBest, readMesh } from "./protocol";
-import type { Frame, Picture, Source } from "./source";
+import { readMesh, type Camera, type Mesh, type State } from "./protocol";
+import { statesOf } from "./states";
 import type { Known } from "./store";
-
-const LAYERS = [
-  "overlay",
-  "photo",
-  "scene",
-  "depth",
-  "normals",
-  "regions",
-  "contours",
-  "photo_contours",
-  "residuals",
-  "joints",
-  "mask",
-];
+import { LAYERS, type Frame, type ImageUrl, type ViewerData } from "./viewer_data";
 
 const OF_PHOTOGRAPHS = ["overlay", "photo", "photo_contours", "residuals"];
 
 /** The states of the chosen view, as frames of the viewer. */
-export class SocketSource implements Source {
+export class StudioData implements ViewerData {
   readonly layers: string[];
   readonly photoKey: string | null;
   readonly viewpoints = true;
@@ -31,33 +17,36 @@ export class SocketSource implements Source {
   readonly key: string;
   readonly frames: Frame[];
   readonly drawCount: number;
+  private readonly run: string | null;
   private readonly states: State[];
   private readonly photoState: State | null;
 
   constructor(
-    private readonly connection: Connection,
+    private readonly connection: Pick<Connection, "ask" | "askBinary">,
     known: Readonly<Known>,
   ) {
     const { view, run, session, draws } = known;
-    const listed = framesOf(known);
-    this.frames = listed.map(([frame]) => frame);
-    this.states = listed.map(([, state]) => state);
+    const current = known.runs.find((r) => r.run === run) ?? null;
+    // Pictures of a program without a scene would be errors.
+    const ofSession = view === "session" || current?.session === session?.session;
+    const shown = session && ofSession && !session.has_view ? [] : statesOf(known);
+    this.frames = shown.map(([frame]) => frame);
+    this.states = shown.map(([, state]) => state);
     // Another photograph changes the pictures of a session's states, whatever its number.
     const data = view === "session" ? JSON.stringify(session?.observe) : "";
     this.key = `${view} ${view === "session" ? session?.session : run} ${data}`;
     this.drawCount = run === null ? 0 : (draws?.draws.length ?? 0);
     this.run = run;
-    const ofRun = known.runs.find((r) => r.run === run)?.observe ?? [];
+    const ofRun = current?.observe ?? [];
     const observed = view === "session" ? (session?.observe ?? []) : ofRun;
     const hasPhoto = view === "session" ? Boolean(session?.photo) : ofRun.length > 0;
     this.photoKey = hasPhoto ? JSON.stringify(observed) : null;
     // A session answers sooner than a run that is at work.
     const same = session?.photo && JSON.stringify(session.observe) === this.photoKey;
     this.photoState = same ? { session: session.session } : null;
-    this.layers = hasPhoto ? LAYERS : LAYERS.filter((layer) => !OF_PHOTOGRAPHS.includes(layer));
+    const layers = LAYERS.map(([layer]) => layer);
+    this.layers = hasPhoto ? layers : layers.filter((layer) => !OF_PHOTOGRAPHS.includes(layer));
   }
-
-  private readonly run: string | null;
 
   async mesh(frame: number): Promise<Mesh> {
     return this.meshOf(this.states[frame]!);
@@ -71,7 +60,7 @@ export class SocketSource implements Source {
     return this.connection.ask<Camera>("camera", { state: this.states[frame]! });
   }
 
-  async photo(): Promise<Picture | null> {
+  async photo(): Promise<ImageUrl | null> {
     const state = this.photoState ?? this.states[0];
     if (!state) return null;
     try {
@@ -82,7 +71,7 @@ export class SocketSource implements Source {
     }
   }
 
-  async picture(frame: number, layer: string, size: number, camera?: Camera): Promise<Picture> {
+  async picture(frame: number, layer: string, size: number, camera?: Camera): Promise<ImageUrl> {
     return askPicture(this.connection, this.states[frame]!, layer, size, camera);
   }
 
@@ -93,45 +82,14 @@ export class SocketSource implements Source {
 
 /** Asks for the picture of a state. */
 export async function askPicture(
-  connection: Connection,
+  connection: Pick<Connection, "askBinary">,
   state: State,
   layer: string,
   size: number,
   camera?: Camera,
-): Promise<Picture> {
+): Promise<ImageUrl> {
   const params = { state, layer, size, ...(camera ? { camera } : {}) };
   const { header, data } = await connection.askBinary("picture", params);
   const url = URL.createObjectURL(new Blob([data.slice()], { type: header.type }));
-  return { url, owned: true, logJoint: header.log_joint ?? null };
-}
-
-function framesOf(known: Readonly<Known>): [Frame, State][] {
-  const { view, run, session, draws, modes } = known;
-  const plain = (label: string, logJoint: number | null = null): Frame => {
-    return { label, chain: null, logJoint };
-  };
-  if (view === "session") {
-    if (!session?.has_view) return [];
-    return [[plain("The session's state", session.log_joint), { session: session.session }]];
-  }
-  if (run === null) return [];
-  const current = known.runs.find((r) => r.run === run) ?? null;
-  // Pictures of a program without a scene would be errors.
-  if (session && current?.session === session.session && !session.has_view) return [];
-  if (view === "best") {
-    // A run that just began, or failed, has no state yet.
-    return hasBest(current) ? [[plain("The best state so far"), { run }]] : [];
-  }
-  if (view === "modes") {
-    return Array.from({ length: modes }, (_, mode) => [plain(`Mode ${mode + 1}`), { run, mode }]);
-  }
-  if (view === "film") {
-    const n = draws?.film ?? 0;
-    const label = "From prior to posterior";
-    return Array.from({ length: n }, (_, film) => [plain(label), { run, film }]);
-  }
-  return (draws?.draws ?? []).map((d, draw) => [
-    { label: `Chain ${d.chain}, draw ${d.draw}`, chain: d.chain, logJoint: d.log_joint },
-    { run, draw },
-  ]);
+  return { url, owned: true };
 }

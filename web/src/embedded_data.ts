@@ -1,10 +1,11 @@
-// What a report's viewer shows: draws and pictures that lie in the page as JSON.
+// The data of a report's viewer: draws and pictures that lie in the page as JSON.
 
+import { inflate } from "./inflate";
 import type { Camera, Mesh } from "./protocol";
-import type { Frame, Picture, Source } from "./source";
+import type { Frame, ImageUrl, ViewerData } from "./viewer_data";
 
 /** A draw as the report holds it. */
-export interface EmbeddedDraw {
+interface EmbeddedDraw {
   chain: number | null;
   draw: number | null;
   log_joint: number | null;
@@ -24,15 +25,8 @@ export interface EmbeddedScene {
   layers: Record<string, string>;
 }
 
-/** The bytes behind base64 text of a zlib stream. */
-export async function inflate(text: string): Promise<Uint8Array> {
-  const packed = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
-
 /** Positions from their differences: all x, then all y, then all z, of 16 bits each. */
-export function readPositions(bytes: Uint8Array, low: number[], high: number[]): Float32Array {
+function readPositions(bytes: Uint8Array, low: number[], high: number[]): Float32Array {
   const data = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const n = Math.floor(bytes.byteLength / 6);
   const positions = new Float32Array(3 * n);
@@ -49,14 +43,14 @@ export function readPositions(bytes: Uint8Array, low: number[], high: number[]):
 }
 
 /** The corners of triangles, of 32 bits each. */
-export function readCorners(bytes: Uint8Array): Uint32Array {
+function readCorners(bytes: Uint8Array): Uint32Array {
   const data = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const count = Math.floor(bytes.byteLength / 4);
   return Uint32Array.from({ length: count }, (_, i) => data.getUint32(4 * i, true));
 }
 
 /** The draws and pictures of a report. */
-export class EmbeddedSource implements Source {
+export class EmbeddedData implements ViewerData {
   readonly key = "report";
   readonly frames: Frame[];
   readonly layers: string[];
@@ -92,15 +86,15 @@ export class EmbeddedSource implements Source {
     return this.scene.camera;
   }
 
-  async photo(): Promise<Picture | null> {
+  async photo(): Promise<ImageUrl | null> {
     const url = this.scene.photo;
-    return url ? { url, owned: false, logJoint: null } : null;
+    return url ? { url, owned: false } : null;
   }
 
-  async picture(_frame: number, layer: string): Promise<Picture> {
+  async picture(_frame: number, layer: string): Promise<ImageUrl> {
     const url = this.scene.layers[layer];
     if (!url) throw new Error(`the report has no picture \`${layer}\``);
-    return { url, owned: false, logJoint: null };
+    return { url, owned: false };
   }
 
   private async readMesh(frame: number): Promise<Mesh> {
