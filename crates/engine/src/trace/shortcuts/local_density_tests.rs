@@ -1,7 +1,6 @@
 //! Local densities against updates: the same weights to the last bit, or no answer.
 
-use super::*;
-use crate::trace::{Change, Draws, Selector, Target, Trace};
+use crate::trace::{Change, Draws, Selector};
 
 /// Counts the weights that local densities gave, over the states of a random walk through
 /// the prior; all are compared with updates.
