@@ -183,21 +183,8 @@ impl Trace {
         self.graph.draws = draws;
         self.graph.constraints.extend(constraints.iter().cloned());
         self.put_observed(observed);
-        let scaffold = match changes {
-            [(target, change)] if observed.is_empty() => {
-                self.graph.scaffold_of(&self.code, *target).map(|s| (*target, change, s))
-            }
-            _ => None,
-        };
-        let propagated = match scaffold {
-            Some((target, change, scaffold)) => {
-                self.graph.update_along_scaffold(&self.code, target, change, scaffold)
-            }
-            None => {
-                self.graph.queue(&self.code, changes);
-                self.graph.propagate(&self.code)
-            }
-        };
+        self.graph.queue(&self.code, changes);
+        let propagated = self.graph.propagate(&self.code);
         self.graph.constraints.clear();
         self.pend(before, propagated)
     }

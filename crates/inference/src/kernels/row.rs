@@ -5,7 +5,7 @@ pub(super) use crate::calls::build::Built;
 use crate::calls::build::{Check, KernelMaker};
 use crate::calls::call::Call;
 use pcadlang_engine::lang::builtins::{Arg, Builtin, HostItem, KernelTraits, Kind, PlanForm, Row};
-pub(super) use pcadlang_engine::lang::builtins::{Domain, Type, arg, flag, int, num, opt};
+pub(super) use pcadlang_engine::lang::builtins::{Type, arg, flag, int, num, opt};
 use pcadlang_engine::lang::error::RunError;
 use std::sync::Arc;
 

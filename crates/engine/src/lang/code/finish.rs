@@ -3,7 +3,7 @@
 use super::op::{Callee, Op, Operand, Slot};
 use super::program::{Block, Code, Eager};
 use super::slots::SlotFacts;
-use super::{flatten, scaffold};
+use super::{dependents::dependents, flatten};
 use crate::lang::local_density::LocalDensity;
 use crate::lang::value::Value;
 
@@ -43,29 +43,21 @@ impl Code {
                     is_result: block.result == Some(Operand::Local(slot as Slot)),
                     reads: op.reads(),
                     users: users.into(),
-                    scaffold: None,
                     local_density: None,
                 });
                 self.ops.push(op);
             }
             let (ops, slots) =
                 (&self.ops[block.first as usize..], &self.slots[block.first as usize..]);
-            let asked = scaffold::always_asked(ops, slots);
             let found: Vec<_> = (0..slots.len() as Slot)
                 .filter(|s| matches!(ops[*s as usize], Op::Draw { .. } | Op::Index { .. }))
                 .filter_map(|s| {
-                    let dependents = scaffold::dependents(ops, slots, s)?;
-                    let scaffold = match slots[s as usize].is_draw {
-                        true => scaffold::scaffold(ops, &dependents, &asked, s),
-                        false => None,
-                    };
-                    let density = LocalDensity::new(ops, dependents, s, &self.builtins);
-                    Some((s, scaffold, density.map(Box::new)))
+                    let dependents = dependents(ops, slots, s)?;
+                    Some((s, LocalDensity::new(ops, dependents, s, &self.builtins).map(Box::new)))
                 })
                 .collect();
-            for (slot, scaffold, local_density) in found {
-                let facts = &mut self.slots[block.first as usize + slot as usize];
-                (facts.scaffold, facts.local_density) = (scaffold, local_density);
+            for (slot, local_density) in found {
+                self.slots[block.first as usize + slot as usize].local_density = local_density;
             }
         }
     }

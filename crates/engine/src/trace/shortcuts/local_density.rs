@@ -9,7 +9,7 @@ use crate::lang::builtins::Scalar;
 use crate::lang::code::{Code, DistSpec, Op, Operand, Slot};
 use crate::lang::index::index_value;
 use crate::lang::local_density::{
-    Instruction, KeptAlternative, LocalDensity, PARAMETERS, REGISTERS, Source,
+    Input, Instruction, KeptAlternative, LocalDensity, PARAMETERS, REGISTERS,
 };
 use crate::lang::value::{Extent, Value};
 use crate::trace::eval::Score;
@@ -31,9 +31,6 @@ pub(crate) type LocalDensities<'c> = SmallVec<[Placed<'c>; 4]>;
 pub(crate) struct Placed<'c> {
     /// The first node of the frame.
     pub base: NodeId,
-    /// The node that has the value: the choice, or an element of a container that is the
-    /// choice.
-    pub entry: NodeId,
     pub local_density: &'c LocalDensity,
 }
 
@@ -49,18 +46,12 @@ pub(crate) struct Evaluation<'a, const N: usize> {
     code: &'a Code,
     base: NodeId,
     registers: [Register<'a>; N],
-    /// A bit for each filled register.
-    filled: u32,
     /// The values that are neither numbers nor part of the trace.
     made: SmallVec<[Value; 4]>,
-    /// Whether an observation's score is a sum over elements.
-    pub summed: bool,
-    /// The selections that take their other alternative.
-    pub turned: SmallVec<[NodeId; 4]>,
-    /// The scores, by node.
-    pub scores: SmallVec<[(NodeId, f64); 8]>,
-    pub prior: ExactSum,
-    pub likelihood: ExactSum,
+    /// Whether a selection takes its other alternative.
+    turned: bool,
+    prior: ExactSum,
+    likelihood: ExactSum,
 }
 
 impl Trace {
@@ -105,6 +96,12 @@ impl Graph {
         whole && matches!(node.value, Value::Num(_) | Value::Bool(_))
     }
 
+    /// Whether nodes of other frames read this one.
+    fn is_read_outside(&self, n: NodeId) -> bool {
+        let users = &self.outside[self.nodes[n as usize].outside as usize];
+        users.users.len() > users.gone as usize
+    }
+
     /// Returns the local densities that together give the effect of another value of a
     /// choice; `None` if there are none in this state.
     pub fn local_densities<'c>(
@@ -122,12 +119,8 @@ impl Graph {
             return None;
         }
         let mut all = LocalDensities::new();
-        self.add_local_density(
-            target,
-            target - facts.slot,
-            facts.local_density.as_deref()?,
-            &mut all,
-        )?;
+        let own = facts.local_density.as_deref()?;
+        self.add_local_density(target - facts.slot, own, &mut all)?;
         let readers = &self.outside[self.nodes[target as usize].outside as usize].users;
         if readers.len() > READERS {
             return None;
@@ -147,7 +140,7 @@ impl Graph {
             if self.is_read_outside(*m) {
                 return None;
             }
-            self.add_local_density(*m, m - facts.slot, facts.local_density.as_deref()?, &mut all)?;
+            self.add_local_density(m - facts.slot, facts.local_density.as_deref()?, &mut all)?;
         }
         Some(all)
     }
@@ -155,7 +148,6 @@ impl Graph {
     /// Adds a local density, if it covers everything that depends on its value.
     fn add_local_density<'c>(
         &self,
-        entry: NodeId,
         base: NodeId,
         local_density: &'c LocalDensity,
         all: &mut LocalDensities<'c>,
@@ -169,7 +161,7 @@ impl Graph {
         {
             return None;
         }
-        all.push(Placed { base, entry, local_density });
+        all.push(Placed { base, local_density });
         Some(())
     }
 
@@ -189,7 +181,7 @@ impl Graph {
         let mut e = Evaluation::new(self, code, []);
         e.base = n - self.slot_facts(code, n).slot;
         for (to, o) in read.iter_mut().zip(args) {
-            *to = e.read(Source::Operand(*o))?;
+            *to = e.read(Input::Operand(*o))?;
         }
         family(code.builtins.get(*builtin), read)
     }
@@ -216,21 +208,19 @@ impl<'a> Evaluation<'a, REGISTERS> {
     }
 
     /// Starts with a value of the choice.
-    pub fn begin(&mut self, value: Register<'a>) {
+    fn begin(&mut self, value: Register<'a>) {
         self.registers[0] = value;
         self.made.clear();
-        self.summed = false;
-        self.turned.clear();
-        self.scores.clear();
+        self.turned = false;
         self.prior = ExactSum::default();
         self.likelihood = ExactSum::default();
     }
 
     /// Runs a local density. With `may_choose`, selections may take their other
     /// alternative.
-    pub fn run(&mut self, placed: &Placed, may_choose: bool) -> Option<()> {
+    fn run(&mut self, placed: &Placed, may_choose: bool) -> Option<()> {
         let local_density = placed.local_density;
-        (self.base, self.filled) = (placed.base, 1);
+        self.base = placed.base;
         let mut next = 0;
         while let Some(instruction) = local_density.instructions.get(next) {
             next += 1;
@@ -272,7 +262,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
                 }
                 Instruction::Compute { slot, first, count, into } => {
                     let from = first as usize;
-                    let operands = &local_density.sources[from..from + count as usize];
+                    let operands = &local_density.inputs[from..from + count as usize];
                     self.compute(slot, operands, into)?;
                 }
                 Instruction::Branch { slot, cond, otherwise } => {
@@ -280,12 +270,11 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     let node = self.node(slot);
                     let other =
                         node.state == State::Clean && holds != (node.flags & OTHERWISE == 0);
-                    if other && !self.turned.contains(&(self.base + slot)) {
-                        if self.turned.is_empty() && !(may_choose && self.can_choose(local_density))
-                        {
+                    if other && !self.turned {
+                        if !(may_choose && self.can_choose(local_density)) {
                             return None;
                         }
-                        self.turned.push(self.base + slot);
+                        self.turned = true;
                     }
                     if !holds {
                         next = otherwise as usize;
@@ -304,7 +293,6 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     )?;
                     self.prior.sub(self.node(slot).score);
                     self.prior.add(score);
-                    self.scores.push((self.base + slot, score));
                 }
                 Instruction::Observe { slot, builtin, ref parameters, value } => {
                     let n = self.base + slot;
@@ -314,7 +302,6 @@ impl<'a> Evaluation<'a, REGISTERS> {
                         Some(score) => {
                             self.graph.take_score(n, &mut self.likelihood);
                             self.likelihood.add(score);
-                            self.scores.push((n, score));
                         }
                         None => {
                             let count = self.code.builtins.get(builtin).args.len();
@@ -329,31 +316,19 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     let weight = self.number(weight).filter(|w| !w.is_nan())?;
                     self.likelihood.sub(self.node(slot).score);
                     self.likelihood.add(weight);
-                    self.scores.push((self.base + slot, weight));
                 }
             }
         }
         Some(())
     }
 
-    /// Whether a register has been filled.
-    pub fn is_filled(&self, r: u8) -> bool {
-        self.filled & (1 << r) != 0
-    }
-
-    /// Returns the value in a register.
-    pub fn value_in(&self, r: u8) -> Value {
-        self.to_value(self.registers[r as usize])
-    }
-
     #[inline(always)]
     fn fill(&mut self, into: u8, value: Register<'a>) {
         self.registers[into as usize] = value;
-        self.filled |= 1 << into;
     }
 
     /// Runs the operation in a slot on these operands, as an update would.
-    fn compute(&mut self, slot: Slot, operands: &[Source], into: u8) -> Option<()> {
+    fn compute(&mut self, slot: Slot, operands: &[Input], into: u8) -> Option<()> {
         // Containers that it reads are held by its node.
         if self.node(slot).side.is_some() {
             return None;
@@ -397,7 +372,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
     }
 
     /// Scores an observation of any kind, as an update would.
-    fn observe(&mut self, slot: Slot, parameters: &[Source], observed: Source) -> Option<()> {
+    fn observe(&mut self, slot: Slot, parameters: &[Input], observed: Input) -> Option<()> {
         let n = self.base + slot;
         let Op::Observe { dist, .. } = self.graph.op(self.code, n) else { return None };
         let values = self.values(parameters)?;
@@ -409,14 +384,8 @@ impl<'a> Evaluation<'a, REGISTERS> {
         let score = self.graph.score_of_values(self.code, n, dist, &values, &observed).ok()?;
         self.graph.take_score(n, &mut self.likelihood);
         match score {
-            Score::One(score) => {
-                self.likelihood.add(score);
-                self.scores.push((n, score));
-            }
-            Score::Sum(sum) => {
-                self.likelihood.merge(&sum);
-                self.summed = true;
-            }
+            Score::One(score) => self.likelihood.add(score),
+            Score::Sum(sum) => self.likelihood.merge(&sum),
         }
         Some(())
     }
@@ -451,7 +420,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
     fn log_density(
         &self,
         builtin: u32,
-        parameters: &[Source; PARAMETERS],
+        parameters: &[Input; PARAMETERS],
         x: Register,
     ) -> Option<f64> {
         let builtin = self.code.builtins.get(builtin);
@@ -499,11 +468,8 @@ impl<'a, const N: usize> Evaluation<'a, N> {
             code,
             base: 0,
             registers,
-            filled: 0,
             made: SmallVec::new(),
-            summed: false,
-            turned: SmallVec::new(),
-            scores: SmallVec::new(),
+            turned: false,
             prior: ExactSum::default(),
             likelihood: ExactSum::default(),
         }
@@ -519,27 +485,27 @@ impl<'a, const N: usize> Evaluation<'a, N> {
     }
 
     #[inline(always)]
-    fn read(&self, s: Source) -> Option<Register<'a>> {
+    fn read(&self, s: Input) -> Option<Register<'a>> {
         let node = match s {
-            Source::Register(r) => return Some(self.registers[r as usize]),
-            Source::Operand(Operand::Const(i)) => {
+            Input::Register(r) => return Some(self.registers[r as usize]),
+            Input::Operand(Operand::Const(i)) => {
                 return Some(Register::of(self.code.const_value(i)));
             }
-            Source::Operand(Operand::Local(slot)) => self.node(slot),
-            Source::Operand(o) => &self.graph.nodes[self.graph.resolve(self.frame(), o)? as usize],
+            Input::Operand(Operand::Local(slot)) => self.node(slot),
+            Input::Operand(o) => &self.graph.nodes[self.graph.resolve(self.frame(), o)? as usize],
         };
         (node.state == State::Clean).then(|| Register::of(&node.value))
     }
 
     #[inline(always)]
-    fn number(&self, s: Source) -> Option<f64> {
+    fn number(&self, s: Input) -> Option<f64> {
         match self.read(s)? {
             Register::Num(x) => Some(x),
             _ => None,
         }
     }
 
-    fn truth(&self, s: Source) -> Option<bool> {
+    fn truth(&self, s: Input) -> Option<bool> {
         match self.read(s)? {
             Register::Bool(b) => Some(b),
             _ => None,
@@ -556,14 +522,14 @@ impl<'a, const N: usize> Evaluation<'a, N> {
     }
 
     /// Returns a value as an operation reads it.
-    fn value(&self, s: Source) -> Option<Value> {
+    fn value(&self, s: Input) -> Option<Value> {
         match self.read(s)? {
             Register::Other(Value::Container(_)) => None,
             r => Some(self.to_value(r)),
         }
     }
 
-    fn values(&self, all: &[Source]) -> Option<SmallVec<[Value; 4]>> {
+    fn values(&self, all: &[Input]) -> Option<SmallVec<[Value; 4]>> {
         all.iter().map(|s| self.value(*s)).collect()
     }
 }

@@ -29,12 +29,6 @@ impl Graph {
         }
     }
 
-    /// Invalidates the nodes of other frames that read a choice.
-    pub fn invalidate_outside_users(&mut self, code: &Code, n: NodeId) {
-        self.invalidate_each_outside(code, n);
-        self.invalidate_pending(code);
-    }
-
     fn invalidate_each_outside(&mut self, code: &Code, n: NodeId) {
         let list = self.nodes[n as usize].outside as usize;
         for i in 0..self.outside[list].users.len() {
