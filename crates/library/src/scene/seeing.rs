@@ -124,6 +124,14 @@ mod tests {
     }
 
     #[test]
+    fn an_argument_that_is_gone_says_so() {
+        let text = "include \"std/scene.pcad\" as scene;
+            let view = scene.render(scene.sphere(1), detail = 0.5);";
+        let error = crate::Program::parse(text).and_then(crate::Program::compile).unwrap_err();
+        assert!(error.to_string().contains("no argument `detail` any more"), "{error}");
+    }
+
+    #[test]
     fn bounds_of_a_cube() {
         // Half a unit at depth 7.5 is 8 / 4.4 * 0.5 / 7.5 of the picture.
         let half = 8.0 / 4.4 * 0.5 / 7.5;

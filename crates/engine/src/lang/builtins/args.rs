@@ -1,6 +1,6 @@
 //! Access to the arguments of a built-in, with errors that name the argument.
 
-use super::builtin::{Args, Argument, Domain};
+use super::builtin::{Args, Argument, Domain, Which};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::{MOST_ELEMENTS, Object, Record, Value};
 use std::borrow::Cow;
@@ -8,27 +8,6 @@ use std::sync::Arc;
 
 /// Numbers, borrowed if the value is already an array of numbers.
 type Numbers<'a> = Cow<'a, [f64]>;
-
-/// Which argument: its position, or its name.
-pub trait Which: Copy {
-    /// Returns its position.
-    fn position(self, args: &[Argument]) -> usize;
-}
-
-impl Which for usize {
-    #[inline]
-    fn position(self, _: &[Argument]) -> usize {
-        self
-    }
-}
-
-impl Which for &str {
-    fn position(self, args: &[Argument]) -> usize {
-        let found = args.iter().position(|a| a.name == self);
-        debug_assert!(found.is_some(), "no argument `{self}`");
-        found.unwrap_or(usize::MAX)
-    }
-}
 
 impl<'a> Args<'a> {
     /// Returns an argument, or its default if it is omitted.

@@ -236,6 +236,27 @@ pub struct Args<'a> {
     pub values: &'a [&'a Value],
 }
 
+/// Which argument: its position, or its name.
+pub trait Which: Copy {
+    /// Returns its position.
+    fn position(self, args: &[Argument]) -> usize;
+}
+
+impl Which for usize {
+    #[inline]
+    fn position(self, _: &[Argument]) -> usize {
+        self
+    }
+}
+
+impl Which for &str {
+    fn position(self, args: &[Argument]) -> usize {
+        let found = args.iter().position(|a| a.name == self);
+        debug_assert!(found.is_some(), "no argument `{self}`");
+        found.unwrap_or(usize::MAX)
+    }
+}
+
 /// The adjoints of a call's arguments, in order; omitted trailing ones are zero.
 pub type ArgAdjoints = SmallVec<[Adjoint; 4]>;
 

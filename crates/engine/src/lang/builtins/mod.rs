@@ -28,10 +28,9 @@ mod reduce;
 mod row;
 mod table;
 
-pub use args::Which;
 pub use builtin::{
     ArgAdjoints, Args, Argument, Binary, Builtin, Derivative, Domain, Form, HostItem, KernelTraits,
-    Kind, PlanForm, PreviousEvaluation, Reduction, Scalar, State, Text, Type, Vjp,
+    Kind, PlanForm, PreviousEvaluation, Reduction, Scalar, State, Text, Type, Vjp, Which,
 };
 pub use covariance::CovarianceValue;
 pub(crate) use derivative::times;

@@ -144,8 +144,16 @@ fn traits(a: &Argument) -> String {
     let mut s = a.ty.to_string();
     match a.domain {
         Domain::Any => {}
+        Domain::Positive => s.push_str(" above 0"),
+        Domain::NotNegative => s.push_str(" of at least 0"),
+        Domain::From([low, high]) => drop(write!(s, " from {low} to {high}")),
+        Domain::Between01 => s.push_str(" between 0 and 1"),
+        Domain::Below1 => s.push_str(" from 0 to below 1"),
         Domain::Whole([low, high]) => drop(write!(s, " from {low} to {high}")),
-        domain => drop(write!(s, ", {domain}")),
+        Domain::Words(words) => {
+            let quoted: Vec<String> = words.iter().map(|w| format!("\"{w}\"")).collect();
+            let _ = write!(s, ", {}", quoted.join(" or "));
+        }
     }
     if !a.unit.is_empty() {
         let _ = write!(s, ", {}", a.unit);
