@@ -2,9 +2,10 @@
 //! the runs of `pcadlang run`.
 
 use super::folder::Folder;
-use super::protocol::{self, Answer, Call, StateName};
+use super::protocol::{self, Call, StateName};
 use super::results::{self, finite};
 use super::runs::Runs;
+use super::server::Answer;
 use super::sessions::{OpenSession, Sessions, job_of};
 use super::states::{no_view, picture};
 use pcadlang_engine::lang::builtins::data::from_json;

@@ -8,14 +8,12 @@
 //! for times.
 
 mod background;
-mod change;
 mod choices;
 mod command;
 mod complete;
 mod draws;
 mod edit;
 mod files;
-mod layers;
 mod look;
 mod picture;
 mod plot;
@@ -27,13 +25,11 @@ mod state;
 
 pub use crate::failure::Failure;
 pub use background::Status;
-pub use change::Scores;
-pub use choices::{ChoiceRow, Marks, to_json};
+pub use choices::{ChoiceRow, Marks, Scores, to_json};
 pub use command::{COMMANDS, Command};
 pub use complete::Completion;
 pub use files::{exported, exported_operand};
-pub use layers::{Layer, photo_contours};
-pub use picture::{ViewPicture, detected, observed_image, over};
+pub use picture::{Layer, ViewPicture, detected, observed_image, over, photo_contours};
 pub use reply::{Reply, Request};
 pub use shown::short;
 pub use state::Session;
