@@ -127,10 +127,9 @@ impl LocalDensity {
             held: Vec::new(),
             computed: Vec::new(),
         };
-        dependents.iter().for_each(|s| compiler.dependent[*s as usize] = true);
-        let is_score = |s: &Slot| {
-            matches!(ops[*s as usize], Op::Draw { .. } | Op::Observe { .. } | Op::Factor { .. })
-        };
+        dependents.iter().for_each(|s| compiler.dependent[*s] = true);
+        let is_score =
+            |s: &Slot| matches!(ops[*s], Op::Draw { .. } | Op::Observe { .. } | Op::Factor { .. });
         let (scores, computations): (Vec<Slot>, Vec<Slot>) =
             dependents.into_iter().partition(is_score);
         scores.into_iter().try_for_each(|slot| compiler.score(slot))?;
@@ -173,7 +172,7 @@ impl Compiler<'_> {
     fn score(&mut self, slot: Slot) -> Option<()> {
         let known = self.known.clone();
         let skip = self.push(Instruction::SkipUnevaluated { slot, to: 0 })?;
-        let instruction = match &self.ops[slot as usize] {
+        let instruction = match &self.ops[slot] {
             Op::Draw { dist: DistSpec::Family { builtin, args }, keys, .. } => {
                 if keys.iter().any(|k| self.depends(*k)) {
                     return None;
@@ -212,7 +211,7 @@ impl Compiler<'_> {
     }
 
     fn depends(&self, o: Operand) -> bool {
-        matches!(o, Operand::Local(s) if s == self.from || self.dependent[s as usize])
+        matches!(o, Operand::Local(s) if s == self.from || self.dependent[s])
     }
 
     /// Returns the source of an operand's value.
@@ -221,12 +220,12 @@ impl Compiler<'_> {
         if slot == self.from {
             return Some(Source::Register(0));
         }
-        if let Some(r) = self.known[slot as usize] {
+        if let Some(r) = self.known[slot] {
             return Some(Source::Register(r));
         }
-        if self.dependent[slot as usize] {
+        if self.dependent[slot] {
             let r = self.compute(slot)?;
-            self.known[slot as usize] = Some(r);
+            self.known[slot] = Some(r);
             self.results.push((slot, r));
             return Some(Source::Register(r));
         }
@@ -240,13 +239,13 @@ impl Compiler<'_> {
         self.push(Instruction::Copy { from: Source::Register(r), into })?;
         self.known = known;
         self.land(recall);
-        self.known[slot as usize] = Some(into);
+        self.known[slot] = Some(into);
         self.results.push((slot, into));
         Some(Source::Register(into))
     }
 
     fn is_computed(&self, slot: Slot) -> bool {
-        match &self.ops[slot as usize] {
+        match &self.ops[slot] {
             // A host's functions may be costly, or keep a state in the node.
             Op::Prim { builtin, .. } => self.builtins.get(*builtin).host.is_none(),
             Op::Index { .. } | Op::Select { .. } | Op::Array(_) | Op::Record { .. } => true,
@@ -256,7 +255,7 @@ impl Compiler<'_> {
 
     /// Emits the instructions that compute a slot; returns the register of its value.
     fn compute(&mut self, slot: Slot) -> Option<u8> {
-        match &self.ops[slot as usize] {
+        match &self.ops[slot] {
             Op::Prim { builtin, args } if self.is_on_numbers(*builtin) => {
                 let mut arg = |i: usize| self.source(*args.get(i)?);
                 let (x, y) = (arg(0)?, arg(1));
@@ -346,7 +345,7 @@ impl Compiler<'_> {
 
     /// Returns a slot that only computes, with its operands.
     fn computation(&self, slot: Slot) -> Option<(Slot, Vec<Operand>)> {
-        let op = &self.ops[slot as usize];
+        let op = &self.ops[slot];
         let mut operands = Vec::new();
         match op {
             Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } => {}

@@ -9,6 +9,7 @@
 //! value recursively: size and depth are limited.
 
 use super::adjoint::Adjoint;
+use super::ids::{BlockId, FrameId, NodeId};
 use indexmap::IndexMap;
 use pcadlang_numerics::dist::{Datum, Dist};
 use pcadlang_numerics::rng::Stream;
@@ -58,9 +59,9 @@ pub type Record = IndexMap<Arc<str>, Value>;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Closure {
     /// The function's block.
-    pub block: u32,
+    pub block: BlockId,
     /// The frame in which it was created.
-    pub frame: u32,
+    pub frame: FrameId,
 }
 
 /// A reference to a node of the trace that holds structure rather than a value. The
@@ -69,7 +70,7 @@ pub struct Closure {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NodeRef {
     /// The node.
-    pub node: u32,
+    pub node: NodeId,
     /// Its version.
     pub version: u32,
 }

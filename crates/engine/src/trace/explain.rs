@@ -4,8 +4,8 @@
 //! What is affected is found by invalidation, as in an update (`invalidate.rs`), which is
 //! then undone. Nothing is evaluated.
 
-use super::graph::Graph;
 use super::node::*;
+use super::store::Store;
 use super::{Address, Target, Trace};
 use crate::lang::code::{Callee, Code, Op, Operand};
 use pcadlang_numerics::num::ExactSum;
@@ -65,7 +65,7 @@ impl Trace {
     pub fn dependents(&mut self, t: Target) -> Dependents {
         self.rollback();
         let before = self.graph.begin();
-        self.graph.invalidate_target(&self.code, t.node);
+        self.graph.update.invalidate_target(&mut self.graph.store, &self.code, t.node);
         let reach = self.graph.dependents_of(&self.code, t.node);
         self.graph.rollback(&self.code, before);
         reach
@@ -82,10 +82,10 @@ impl Trace {
     /// Returns the source spans of draws that have no choice in this state because no
     /// observation depends on them, in source order.
     pub fn undrawn(&self) -> Vec<Span> {
-        let there: FxHashSet<u32> =
-            self.graph.nodes.iter().filter(|n| n.state == State::Clean).map(|n| n.op).collect();
-        let written = self.code.blocks.iter().flat_map(|b| (b.first..).zip(&b.spans));
-        let is_choice = |op: &u32| matches!(self.code.ops.get(*op as usize), Some(Op::Draw { .. }));
+        let there: FxHashSet<OpId> = self.graph.clean().map(|n| self.graph.store[n].op).collect();
+        let written =
+            self.code.blocks.iter().flat_map(|b| b.slots().map(|s| b.first + s).zip(&b.spans));
+        let is_choice = |op: &OpId| matches!(self.code.ops.get(op.index()), Some(Op::Draw { .. }));
         let absent = written.filter(|(op, _)| is_choice(op) && !there.contains(op));
         let mut spans: Vec<Span> = absent.map(|(_, span)| *span).collect();
         spans.sort_by_key(|s| (s.file, s.start));
@@ -93,7 +93,7 @@ impl Trace {
     }
 }
 
-impl Graph {
+impl Store {
     /// Collects the stale nodes, except the choice at which invalidation started.
     fn dependents_of(&self, code: &Code, from: NodeId) -> Dependents {
         let mut reach = Dependents::default();
@@ -101,7 +101,7 @@ impl Graph {
             let address = self.address(code, n);
             reach.terms.push(Dependent { address, term, effect, log_density: self.term_score(n) });
         };
-        for (n, node) in (0..).zip(&self.nodes) {
+        for (n, node) in self.nodes() {
             let is_marked = node.state == State::Stale;
             if n == from || !(is_marked || node.state == State::Clean) {
                 continue;
@@ -131,7 +131,7 @@ impl Graph {
     /// factor.
     fn term_score(&self, n: NodeId) -> f64 {
         let mut sum = ExactSum::default();
-        match self.nodes[n as usize].side.as_deref() {
+        match self[n].side.as_deref() {
             Some(Side::Choice(c)) if c.elements != NONE => {
                 c.scores.iter().for_each(|s| sum.add(*s))
             }
@@ -145,18 +145,18 @@ impl Graph {
     fn hangs_on_marked(&self, code: &Code, n: NodeId) -> bool {
         let mut deciding = Vec::new();
         self.deciding(code, n, &mut deciding);
-        deciding.iter().any(|d| self.nodes[*d as usize].state == State::Stale)
+        deciding.iter().any(|d| self[*d].state == State::Stale)
     }
 
     /// Collects the nodes that decide whether `n` exists.
     fn deciding(&self, code: &Code, n: NodeId, into: &mut Vec<NodeId>) {
-        let mut frame = self.nodes[n as usize].frame;
+        let mut frame = self[n].frame;
         loop {
-            let owner = self.frames[frame as usize].owner;
-            if owner == NONE {
+            let owner = self[frame].owner;
+            if owner == NodeId::NONE {
                 return;
             }
-            frame = self.nodes[owner as usize].frame;
+            frame = self[owner].frame;
             let mut by = |o: Operand| into.extend(self.resolve(frame, o));
             match self.op(code, owner) {
                 Op::If { cond, .. } => by(*cond),
@@ -169,13 +169,13 @@ impl Graph {
     }
 
     fn origins(&self, code: &Code, n: NodeId) -> Vec<Address> {
-        let mut seen = vec![false; self.nodes.len()];
+        let mut seen = vec![false; self.len()];
         let mut open = Vec::new();
         self.each_dep(code, n, |d, _| open.push(d));
         self.deciding(code, n, &mut open);
         let mut found = Vec::new();
         while let Some(d) = open.pop() {
-            if std::mem::replace(&mut seen[d as usize], true) {
+            if std::mem::replace(&mut seen[d], true) {
                 continue;
             }
             match self.op(code, d) {

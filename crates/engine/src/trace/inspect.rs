@@ -1,9 +1,9 @@
 //! The contents of a trace: selections, choices by address, values, distributions,
 //! observations.
 
-use super::node::{self, NONE, State};
+use super::node::{self, NONE, NodeId, State};
 use super::{Address, Selection, Selector, Target, Trace};
-use super::{eval, update};
+use super::{eval, terms};
 use crate::lang::code::{DistSpec, Op};
 use crate::lang::value::{Likelihood, Located, Value};
 use pcadlang_numerics::dist::{Datum, Dist, Support};
@@ -13,7 +13,7 @@ impl Trace {
     /// Registers a selection, whose members are kept up to date from then on.
     pub fn select(&mut self, selector: &Selector) -> Selection {
         self.rollback();
-        self.graph.selection(&self.code, selector)
+        self.graph.choices.selection(&self.graph.store, &self.code, selector)
     }
 
     /// Returns the current members of a selection.
@@ -54,7 +54,7 @@ impl Trace {
         let mut whole = address.clone();
         let key = whole.segments.last_mut()?.keys.pop()?;
         let n = self.graph.choices.find(whole.hash64())?;
-        let elements = match self.graph.nodes[n as usize].side.as_deref() {
+        let elements = match self.graph.store[n].side.as_deref() {
             Some(node::Side::Choice(c)) if c.elements != NONE => c.elements,
             _ => return None,
         };
@@ -66,7 +66,7 @@ impl Trace {
     pub fn address(&self, t: Target) -> Address {
         let mut a = self.graph.address(&self.code, t.node);
         if t.element != NONE {
-            update::push_key(&mut a, t.element);
+            terms::push_key(&mut a, t.element);
         }
         a
     }
@@ -79,14 +79,14 @@ impl Trace {
 
     /// Whether a target that was listed earlier is still a choice of this trace.
     pub fn is_active(&self, t: Target) -> bool {
-        let node = self.graph.nodes.get(t.node as usize);
+        let node = self.graph.store.get(t.node);
         node.is_some_and(|n| n.state == State::Clean)
             && matches!(self.graph.op(&self.code, t.node), Op::Draw { .. })
     }
 
     /// Returns the value of a choice as the program sees it.
     pub fn value(&self, t: Target) -> Value {
-        let v = &self.graph.nodes[t.node as usize].value;
+        let v = &self.graph.store[t.node].value;
         if t.element == NONE {
             v.clone()
         } else {
@@ -137,7 +137,7 @@ impl Trace {
     /// Returns the number of elements, if a choice is an array of separately addressed
     /// elements.
     pub fn elements(&self, t: Target) -> Option<usize> {
-        match self.graph.nodes[t.node as usize].side.as_deref() {
+        match self.graph.store[t.node].side.as_deref() {
             Some(node::Side::Choice(c)) if c.elements != NONE && t.element == NONE => {
                 Some(c.elements as usize)
             }
@@ -194,9 +194,9 @@ impl Trace {
         zero.filter_map(why).collect()
     }
 
-    pub(super) fn span(&self, n: u32) -> pcadlang_syntax::span::Span {
-        let frame = &self.graph.frames[self.graph.nodes[n as usize].frame as usize];
-        self.code.blocks[frame.block as usize].spans[(n - frame.base) as usize]
+    pub(super) fn span(&self, n: NodeId) -> pcadlang_syntax::span::Span {
+        let frame = &self.graph.store[self.graph.store[n].frame];
+        self.code.blocks[frame.block].spans[n - frame.base]
     }
 
     /// Whether an observation has an unnormalised likelihood, whose scale is a modelling
@@ -221,26 +221,19 @@ impl Trace {
     }
 
     /// Iterates over the observations and factors.
-    pub(super) fn scored_nodes(&self) -> impl Iterator<Item = u32> {
-        let nodes = self
-            .graph
-            .nodes
-            .iter()
-            .zip(0..)
-            .filter(|(n, _)| n.state == State::Clean)
-            .map(|(_, i)| i);
-        nodes.filter(|n| {
+    pub(super) fn scored_nodes(&self) -> impl Iterator<Item = NodeId> {
+        self.graph.clean().filter(|n| {
             matches!(self.graph.op(&self.code, *n), Op::Observe { .. } | Op::Factor { .. })
         })
     }
 
-    pub(super) fn scored(&self) -> Vec<(u32, f64)> {
+    pub(super) fn scored(&self) -> Vec<(NodeId, f64)> {
         self.scored_nodes().map(|n| (n, self.score_at(n))).collect()
     }
 
     /// Returns the log density of an observation or factor.
-    pub(super) fn score_at(&self, n: u32) -> f64 {
-        let n = &self.graph.nodes[n as usize];
+    pub(super) fn score_at(&self, n: NodeId) -> f64 {
+        let n = &self.graph.store[n];
         match n.side.as_deref() {
             Some(node::Side::Total(t)) if n.score == 0.0 => t.sum.value(),
             _ => n.score,
@@ -262,13 +255,13 @@ impl Trace {
     }
 
     /// The same, with the nodes of the observations.
-    fn likelihoods_at(&self) -> impl Iterator<Item = (u32, &dyn Likelihood, &Value)> {
+    fn likelihoods_at(&self) -> impl Iterator<Item = (NodeId, &dyn Likelihood, &Value)> {
         self.scored_nodes().filter_map(|n| {
             let Op::Observe { dist: DistSpec::Value(o), value, .. } = self.graph.op(&self.code, n)
             else {
                 return None;
             };
-            let frame = self.graph.nodes[n as usize].frame;
+            let frame = self.graph.store[n].frame;
             let Value::Likelihood(l) = self.graph.value(&self.code, frame, *o) else { return None };
             let observed = self.graph.observed_value(&self.code, n, *value, &mut node::Deps::new());
             Some((n, &**l, observed))

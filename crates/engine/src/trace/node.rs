@@ -14,12 +14,9 @@ use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-/// The index of a node.
-pub(crate) type NodeId = u32;
-/// The index of a frame.
-pub(crate) type FrameId = u32;
+pub(crate) use crate::lang::ids::{BlockId, FrameId, NodeId, OpId, SiteId, Slot};
 
-/// No node or no frame.
+/// Not an element: a whole choice.
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// Whether a node's value is up to date.
@@ -61,7 +58,7 @@ pub(crate) struct Node {
     /// [`HELD`], [`TARGET`], [`WAS_STALE`], [`IMPROPER`], [`OTHERWISE`], [`SAVED`].
     pub flags: u8,
     /// Its operation, by index in [`crate::lang::code::Code::ops`].
-    pub op: u32,
+    pub op: OpId,
     /// Its contribution to the log joint, if that is a single term.
     pub score: f64,
     /// Data that only structural nodes and vector choices need.
@@ -156,7 +153,7 @@ pub(crate) struct Loop {
     /// The frames; [`NONE`] for a pass that nothing has needed yet.
     pub frames: Vec<FrameId>,
     /// The block of the body and its lexical parent frame.
-    pub block: u32,
+    pub block: BlockId,
     /// See `block`.
     pub parent: FrameId,
     /// For `fold`: the node with the last result.
@@ -227,7 +224,7 @@ pub(crate) struct Element {
 #[derive(Clone, Debug)]
 pub(crate) struct Memo {
     /// The function.
-    pub block: u32,
+    pub block: BlockId,
     /// Its lexical parent frame.
     pub parent: FrameId,
     /// The live entries: frame and number of calls that use each.
@@ -268,11 +265,11 @@ pub(crate) enum Arguments {
     Supplied(Arc<[Result<Value, Box<RunError>>]>),
 }
 
-/// One instance of a block.
+/// One instance of a block; by default, of the top level.
 #[derive(Clone, Debug)]
 pub(crate) struct Frame {
     /// The block.
-    pub block: u32,
+    pub block: BlockId,
     /// The frame of the lexically enclosing block.
     pub parent: FrameId,
     /// The node that made it; [`NONE`] for the top level.
@@ -293,6 +290,23 @@ pub(crate) struct Frame {
     pub attached: bool,
 }
 
+impl Default for Frame {
+    fn default() -> Frame {
+        Frame {
+            block: BlockId::ROOT,
+            parent: FrameId::NONE,
+            owner: NodeId::NONE,
+            base: NodeId(0),
+            path: 0,
+            depth: 0,
+            pass: 0,
+            key: None,
+            args: Arguments::None,
+            attached: true,
+        }
+    }
+}
+
 /// Users of a node that cannot be derived from its block.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Outside {
@@ -300,4 +314,11 @@ pub(crate) struct Outside {
     pub users: SmallVec<[NodeId; 4]>,
     /// How many have.
     pub gone: u32,
+}
+
+impl Outside {
+    /// True if most of the users have released the node.
+    pub fn is_untidy(&self) -> bool {
+        self.gone as usize * 2 > self.users.len()
+    }
 }

@@ -10,14 +10,10 @@
 use super::graph::Graph;
 use super::journal::Entry;
 use super::node::*;
-use super::update::Failure;
 use super::{Address, Draws, Trace, TraceResult, Weight};
-use crate::lang::code::{Code, DistSpec, Observed, Op, Operand};
-use crate::lang::density::{is_repeated, pointwise};
-use crate::lang::error::Fault;
+use crate::lang::code::{DistSpec, Observed, Op};
+use crate::lang::density::pointwise;
 use crate::lang::value::Value;
-use pcadlang_numerics::dist::{Datum, Dist, Support};
-use pcadlang_numerics::rng::Stream;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
@@ -50,7 +46,7 @@ impl Trace {
         let (g, code) = (&self.graph, &*self.code);
         let one = |n: NodeId| {
             let Op::Observe { value, site, .. } = g.op(code, n) else { return None };
-            let hash = g.site_hash(code, g.nodes[n as usize].frame, *site);
+            let hash = g.site_hash(code, g.store[n].frame, *site);
             let value = g.observed_value(code, n, *value, &mut Deps::new()).clone();
             Some(Observation { address: g.address(code, n), hash, value })
         };
@@ -74,7 +70,7 @@ impl Trace {
                 silent.push((address, "a factor".to_owned()));
                 continue;
             };
-            let hash = g.site_hash(code, g.nodes[n as usize].frame, *site);
+            let hash = g.site_hash(code, g.store[n].frame, *site);
             match g.draw_observed(code, n, &mut draws.stream(hash))? {
                 Ok(value) => all.push((address, hash, value)),
                 Err(what) => silent.push((address, what)),
@@ -107,7 +103,7 @@ impl Trace {
         let (mut all, mut count) = (Vec::new(), 0);
         for n in self.scored_nodes() {
             let Op::Observe { dist: spec, value, site, .. } = g.op(code, n) else { continue };
-            let (mut deps, frame) = (Deps::new(), g.nodes[n as usize].frame);
+            let (mut deps, frame) = (Deps::new(), g.store[n].frame);
             let observed = g.observed_value(code, n, *value, &mut deps);
             let likelihood = matches!(spec, DistSpec::Value(o) if !matches!(g.value(code, frame, *o), Value::Dist(_)));
             let scores = match likelihood {
@@ -160,9 +156,7 @@ impl Trace {
     pub(super) fn observation_nodes(&self) -> FxHashMap<u64, NodeId> {
         let (g, code) = (&self.graph, &*self.code);
         let hashed = |n: NodeId| match g.op(code, n) {
-            Op::Observe { site, .. } => {
-                Some((g.site_hash(code, g.nodes[n as usize].frame, *site), n))
-            }
+            Op::Observe { site, .. } => Some((g.site_hash(code, g.store[n].frame, *site), n)),
             _ => None,
         };
         self.scored_nodes().filter_map(hashed).collect()
@@ -177,9 +171,9 @@ impl Trace {
         for (hash, value) in values {
             self.graph.put_observed(*hash, value.clone());
             if let Some(n) = nodes.get(hash) {
-                self.graph.save(*n);
-                self.graph.nodes[*n as usize].flags |= TARGET;
-                self.graph.invalidate_target(&self.code, *n);
+                self.graph.update.save(&mut self.graph.store, *n);
+                self.graph.store[*n].flags |= TARGET;
+                self.graph.update.invalidate_target(&mut self.graph.store, &self.code, *n);
             }
         }
     }
@@ -188,7 +182,7 @@ impl Trace {
     /// changes whenever they do, so that holders can detect a change by pointer.
     #[doc(hidden)]
     pub fn replacements(&self) -> &Arc<Observed> {
-        &self.graph.observed
+        &self.graph.store.observed
     }
 
     /// Observes the same values as another trace of the same program.
@@ -197,132 +191,23 @@ impl Trace {
     /// As [`Trace::set_observed`].
     #[doc(hidden)]
     pub fn observe_as(&mut self, other: &Trace) -> TraceResult<()> {
-        if Arc::ptr_eq(&self.graph.observed, &other.graph.observed) {
+        if Arc::ptr_eq(&self.graph.store.observed, &other.graph.store.observed) {
             return Ok(());
         }
         let mut values: Vec<_> =
-            other.graph.observed.iter().map(|(hash, v)| (*hash, v.clone())).collect();
+            other.graph.store.observed.iter().map(|(hash, v)| (*hash, v.clone())).collect();
         values.sort_by_key(|(hash, _)| *hash);
         self.set_observed(&values)?;
         self.commit();
-        self.graph.observed = Arc::clone(&other.graph.observed);
+        self.graph.store.observed = Arc::clone(&other.graph.store.observed);
         Ok(())
     }
 }
 
 impl Graph {
     fn put_observed(&mut self, hash: u64, value: Value) {
-        let old = Arc::make_mut(&mut self.observed).insert(hash, value);
-        self.note(Entry::Observed(hash, old));
-    }
-
-    /// Undoes [`Graph::put_observed`].
-    pub(super) fn undo_observed(&mut self, hash: u64, old: Option<Value>) {
-        let all = Arc::make_mut(&mut self.observed);
-        match old {
-            Some(v) => all.insert(hash, v),
-            None => all.remove(&hash),
-        };
-    }
-
-    /// Returns the value that replaces an observation's value in the program, if any.
-    pub(crate) fn replaced(&self, code: &Code, n: NodeId) -> Option<&Value> {
-        if self.observed.is_empty() {
-            return None;
-        }
-        let Op::Observe { site, .. } = self.op(code, n) else { return None };
-        self.observed.get(&self.site_hash(code, self.nodes[n as usize].frame, *site))
-    }
-
-    /// Returns the value of an observation; nodes read for it are added to `deps`.
-    pub(crate) fn observed_value<'a>(
-        &'a self,
-        code: &'a Code,
-        n: NodeId,
-        value: Operand,
-        deps: &mut Deps,
-    ) -> &'a Value {
-        match self.replaced(code, n) {
-            Some(v) => v,
-            None => self.plain(code, self.nodes[n as usize].frame, value, deps),
-        }
-    }
-
-    /// Returns a message if the observed value is outside the support of its distribution
-    /// under the current parameters, so that its probability is zero.
-    pub(super) fn outside_support(&self, code: &Code, n: NodeId) -> Option<String> {
-        let Op::Observe { dist: spec, value, .. } = self.op(code, n) else { return None };
-        let (mut deps, frame) = (Deps::new(), self.nodes[n as usize].frame);
-        let observed = self.observed_value(code, n, *value, &mut deps);
-        if let DistSpec::Value(o) = spec
-            && !matches!(self.value(code, frame, *o), Value::Dist(_))
-        {
-            return None;
-        }
-        let dist = self.make_dist(code, n, frame, spec, &mut deps).ok()?;
-        let count =
-            dist.elements().or_else(|| observed.len().filter(|_| is_repeated(&dist, observed)));
-        let Some(count) = count else { return outside(&dist, observed) };
-        (0..count).find_map(|i| outside(&dist.element(i), &observed.element(i)?))
-    }
-
-    /// Samples an observation, or describes why it cannot be sampled.
-    fn draw_observed(
-        &self,
-        code: &Code,
-        n: NodeId,
-        rng: &mut Stream,
-    ) -> Result<Result<Value, String>, Failure> {
-        let frame = self.nodes[n as usize].frame;
-        let Op::Observe { dist: spec, value, .. } = self.op(code, n) else {
-            return Ok(Err("a factor".into()));
-        };
-        let mut deps = Deps::new();
-        let observed = self.observed_value(code, n, *value, &mut deps);
-        if let DistSpec::Value(o) = spec
-            && let Value::Likelihood(l) = self.value(code, frame, *o)
-        {
-            return match l.sample(observed, rng) {
-                Some(drawn) => drawn.map(Ok).map_err(|e| self.fault(code, n, Fault::type_error(e))),
-                None => Ok(Err(format!("the likelihood `{}`", l.name()))),
-            };
-        }
-        let dist = self.make_dist(code, n, frame, spec, &mut deps)?;
-        if dist.is_improper() {
-            return Ok(Err(format!("the improper distribution `{}`", dist.name())));
-        }
-        Ok(Ok(sample_like(&dist, observed, rng)))
-    }
-}
-
-/// Returns a message if a value is outside the support of a distribution.
-fn outside(dist: &Dist, observed: &Value) -> Option<String> {
-    let x = observed.to_datum()?;
-    let support = dist.support();
-    let is_truth = support == Support::Boolean && matches!(x, Datum::Num(0.0 | 1.0));
-    let apart = || {
-        format!(
-            "the observed value {observed} is outside the support of `{}` ({support})",
-            dist.name()
-        )
-    };
-    (!is_truth && !support.contains(&x)).then(apart)
-}
-
-/// Samples in the form in which a value is scored: element by element if the distribution
-/// is over less than the whole value.
-fn sample_like(dist: &Dist, observed: &Value, rng: &mut Stream) -> Value {
-    let mut one = |d: &Dist| Value::from_datum(&d.sample(rng));
-    if let Some(count) = dist.elements() {
-        return Value::from_elements((0..count).map(|i| one(&dist.element(i))).collect());
-    }
-    match observed {
-        Value::Array(xs) if is_repeated(dist, observed) => {
-            Value::from_elements(xs.iter().map(|_| one(dist)).collect())
-        }
-        Value::List(_) if observed.to_datum().is_some_and(|x| dist.support().fits(&x)) => one(dist),
-        Value::List(xs) => Value::from_elements(xs.iter().map(|_| one(dist)).collect()),
-        _ => one(dist),
+        let old = Arc::make_mut(&mut self.store.observed).insert(hash, value);
+        self.update.note(Entry::Observed(hash, old));
     }
 }
 

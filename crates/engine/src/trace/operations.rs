@@ -113,7 +113,7 @@ impl Trace {
             self.propose_observed(&sorted.changes, &sorted.constraints, &sorted.observed, draws);
         let mut weight = proposed.map_err(|e| self.misfit_behind(given, e))?;
         let late = self.appeared_observations(given, &sorted);
-        let removed = self.graph.removed.clone();
+        let removed = self.graph.update.removed.clone();
         if !removed.is_empty() || !late.is_empty() {
             // Addresses may contain values that have changed, so they are spelt in the
             // previous state.
@@ -164,7 +164,7 @@ impl Trace {
         let (g, none) = (&self.graph, ExactSum::default());
         let Some(before) = &self.update else { return 0.0 };
         ExactSum::difference_of_sums(
-            [&g.prior, &g.likelihood, &g.drawn],
+            [&g.score.prior, &g.score.likelihood, &g.score.drawn],
             [&before.prior, &before.likelihood, &none],
         )
     }

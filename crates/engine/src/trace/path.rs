@@ -1,15 +1,17 @@
 //! From nodes to addresses. Frames store a hash of their prefix; the address itself is
 //! built on request.
 
-use super::graph::Graph;
+use super::choices::Target;
 use super::node::*;
+use super::store::Store;
 use crate::lang::address::{Address, AddressSegment};
 use crate::lang::code::{BlockKind, Code, DistSpec, Op, Operand, Site};
 use crate::lang::key::{Key, mix};
+use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-impl Graph {
+impl Store {
     /// The keys of the loops around a frame, up to its function, outermost first, without
     /// those that the site's target carries.
     fn loop_keys(&self, code: &Code, frame: FrameId, carried: u32) -> SmallVec<[Key; 2]> {
@@ -17,8 +19,8 @@ impl Graph {
         let mut level = 0;
         let mut f = frame;
         loop {
-            let here = &self.frames[f as usize];
-            match code.blocks[here.block as usize].kind {
+            let here = &self[f];
+            match code.blocks[here.block].kind {
                 BlockKind::Loop => {
                     if carried & (1 << level) == 0 {
                         keys.extend(here.key.clone());
@@ -28,25 +30,25 @@ impl Graph {
                 BlockKind::Branch => {}
                 _ => break,
             }
-            f = self.nodes[here.owner as usize].frame;
+            f = self[here.owner].frame;
         }
         keys.reverse();
         keys
     }
 
     /// Returns the hash of the path through a site.
-    pub fn site_hash(&self, code: &Code, frame: FrameId, site: u32) -> u64 {
-        self.hash_site(code, frame, &code.sites[site as usize], None, &[])
+    pub fn site_hash(&self, code: &Code, frame: FrameId, site: SiteId) -> u64 {
+        self.hash_site(code, frame, &code.sites[site], None, &[])
     }
 
-    /// [`Graph::site_hash`] for an element of a `map` or an entry of `mem`.
-    pub fn keyed_site_hash(&self, code: &Code, frame: FrameId, site: u32, key: &Key) -> u64 {
-        self.hash_site(code, frame, &code.sites[site as usize], Some(key), &[])
+    /// [`Store::site_hash`] for an element of a `map` or an entry of `mem`.
+    pub fn keyed_site_hash(&self, code: &Code, frame: FrameId, site: SiteId, key: &Key) -> u64 {
+        self.hash_site(code, frame, &code.sites[site], Some(key), &[])
     }
 
-    /// [`Graph::site_hash`] for a choice with its own keys.
-    pub fn own_keyed_hash(&self, code: &Code, frame: FrameId, site: u32, own: &[Key]) -> u64 {
-        self.hash_site(code, frame, &code.sites[site as usize], None, own)
+    /// [`Store::site_hash`] for a choice with its own keys.
+    pub fn own_keyed_hash(&self, code: &Code, frame: FrameId, site: SiteId, own: &[Key]) -> u64 {
+        self.hash_site(code, frame, &code.sites[site], None, own)
     }
 
     fn hash_site(
@@ -58,7 +60,7 @@ impl Graph {
         own: &[Key],
     ) -> u64 {
         let last = site.segments.len().saturating_sub(1);
-        let mut h = self.frames[frame as usize].path;
+        let mut h = self[frame].path;
         for (i, s) in site.segments.iter().enumerate() {
             h = mix(h, s.hash);
             if i == 0 {
@@ -74,12 +76,12 @@ impl Graph {
         h
     }
 
-    /// Returns the address through a site; mirrors [`Graph::hash_site`].
+    /// Returns the address through a site; mirrors [`Store::hash_site`].
     fn spell_site(
         &self,
         code: &Code,
         frame: FrameId,
-        site: u32,
+        site: SiteId,
         own: &[Key],
     ) -> Vec<AddressSegment> {
         let mut segments = self.prefix(code, frame);
@@ -92,12 +94,12 @@ impl Graph {
         &self,
         code: &Code,
         frame: FrameId,
-        site: u32,
+        site: SiteId,
         element: Option<&Key>,
         own: &[Key],
         segments: &mut Vec<AddressSegment>,
     ) {
-        let site = &code.sites[site as usize];
+        let site = &code.sites[site];
         let last = site.segments.len().saturating_sub(1);
         for (i, s) in site.segments.iter().enumerate() {
             let mut keys = Vec::new();
@@ -124,11 +126,11 @@ impl Graph {
         let mut calls = Vec::new();
         let mut f = frame;
         loop {
-            let here = &self.frames[f as usize];
-            match code.blocks[here.block as usize].kind {
+            let here = &self[f];
+            match code.blocks[here.block].kind {
                 BlockKind::Root => break,
                 // A function that a plan calls.
-                _ if here.owner == NONE => break,
+                _ if here.owner == NodeId::NONE => break,
                 BlockKind::Function { .. } => {
                     let (Op::Call { site, .. }
                     | Op::Map { site, .. }
@@ -137,11 +139,11 @@ impl Graph {
                     else {
                         break;
                     };
-                    let home = self.nodes[here.owner as usize].frame;
+                    let home = self[here.owner].frame;
                     calls.push((home, *site, here.key.as_ref()));
                     f = home;
                 }
-                _ => f = self.nodes[here.owner as usize].frame,
+                _ => f = self[here.owner].frame,
             }
         }
         let mut segments = Vec::new();
@@ -158,7 +160,7 @@ impl Graph {
 
     /// Returns the address of a choice, observation or factor.
     pub fn address(&self, code: &Code, n: NodeId) -> Address {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self[n].frame;
         let segments = match self.op(code, n) {
             Op::Draw { site, keys, .. } => {
                 let own = self.own_keys(code, frame, keys);
@@ -199,10 +201,47 @@ impl Graph {
 
     /// Returns the top-level name of a node.
     pub fn name_of(&self, code: &Code, n: NodeId) -> Option<Arc<str>> {
-        if self.nodes[n as usize].frame != 0 {
+        if self[n].frame != FrameId::ROOT {
             return None;
         }
         let slot = Operand::Local(self.slot(n));
         code.globals.iter().find(|(_, o)| **o == slot).map(|(name, _)| Arc::clone(name))
+    }
+
+    /// Sorts choices by their position in the program: slot by slot and pass by pass,
+    /// from the outside in.
+    pub fn in_program_order(&self, targets: &[Target]) -> Vec<Target> {
+        let mut keyed: Vec<_> = targets.iter().map(|t| (self.place(t.node), *t)).collect();
+        keyed.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.element.cmp(&b.1.element)));
+        keyed.into_iter().map(|(_, t)| t).collect()
+    }
+
+    /// Returns the slots and passes that lead to a node, from the outside in.
+    fn place(&self, mut n: NodeId) -> SmallVec<[u64; 6]> {
+        let mut place = SmallVec::new();
+        while n != NodeId::NONE {
+            let frame = &self[self[n].frame];
+            place.push(u64::from((n - frame.base).0));
+            // The entries of a `mem` function have no order.
+            let entry = if matches!(frame.args, Arguments::Values(_)) { frame.path } else { 0 };
+            place.extend([u64::from(frame.pass), entry]);
+            n = frame.owner;
+        }
+        place.reverse();
+        place
+    }
+
+    /// Sorts nodes frame by frame, in an order that depends on the state only; node
+    /// numbers depend on its history.
+    pub fn sort_by_place(&self, nodes: &mut [NodeId]) {
+        let frame = |n: NodeId| self[n].frame;
+        let mut frames: Vec<FrameId> = nodes.iter().map(|n| frame(*n)).collect();
+        frames.sort_unstable();
+        frames.dedup();
+        let mut places: Vec<_> = frames.iter().map(|f| (self.place(self[*f].base), *f)).collect();
+        places.sort_unstable();
+        let ranks: FxHashMap<FrameId, usize> =
+            places.into_iter().enumerate().map(|(rank, (_, f))| (f, rank)).collect();
+        nodes.sort_unstable_by_key(|n| (ranks.get(&frame(*n)), *n));
     }
 }

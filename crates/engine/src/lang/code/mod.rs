@@ -14,6 +14,7 @@ mod scaffold;
 mod slots;
 mod surrogate;
 
-pub use op::{BlockId, Callee, DistSpec, Op, Operand, Probe, Slot, Source, SourceKey};
+pub use super::ids::{BlockId, OpId, SiteId, Slot};
+pub use op::{Callee, DistSpec, Op, Operand, Probe, Source, SourceKey};
 pub use program::{Block, BlockKind, Code, Eager, Force, Observed, Site, SiteSegment, SiteTag};
 pub use slots::{SlotFacts, StaticScaffold};

@@ -1,9 +1,10 @@
 //! A lowered program: its blocks, and what their operations refer to by index.
 
-use super::op::{BlockId, Op, Operand, Slot};
+use super::op::{Op, Operand};
 use super::slots::SlotFacts;
 use crate::lang::address::segment_hash;
 use crate::lang::builtins::Table;
+use crate::lang::ids::{BlockId, OpId, Slot};
 use crate::lang::value::Value;
 use pcadlang_syntax::span::Span;
 use std::sync::Arc;
@@ -107,7 +108,7 @@ pub struct Block {
     /// [`Code::ops`].
     pub ops: Vec<Op>,
     /// The index of its first operation in [`Code::ops`].
-    pub first: u32,
+    pub first: OpId,
     /// The source span of each operation.
     pub spans: Vec<Span>,
     /// The value of the block.
@@ -168,7 +169,7 @@ impl Block {
             ops: Vec::new(),
             spans: Vec::new(),
             result: None,
-            first: 0,
+            first: OpId(0),
             effects: Vec::new(),
         }
     }
@@ -178,7 +179,12 @@ impl Block {
         self.spans.len()
     }
 
-    /// Whether it has no slots.
+    /// Iterates over its slots.
+    pub fn slots(&self) -> impl DoubleEndedIterator<Item = Slot> + use<> {
+        (0..self.len()).map(Slot::new)
+    }
+
+    /// True if it has no slots.
     pub fn is_empty(&self) -> bool {
         self.spans.is_empty()
     }
@@ -187,7 +193,7 @@ impl Block {
     pub fn push(&mut self, op: Op, span: Span) -> Slot {
         self.ops.push(op);
         self.spans.push(span);
-        self.ops.len() as Slot - 1
+        Slot::new(self.ops.len() - 1)
     }
 }
 

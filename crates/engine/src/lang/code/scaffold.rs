@@ -5,8 +5,9 @@
 //! that depend on the choice are the same in every state, and an update can go through
 //! them in order instead of invalidating and re-evaluating on demand.
 
-use super::op::{DistSpec, Op, Operand, Slot};
+use super::op::{DistSpec, Op, Operand};
 use super::slots::{SlotFacts, StaticScaffold};
+use crate::lang::ids::Slot;
 use smallvec::SmallVec;
 
 /// The maximum length of the list; one bit per slot in [`StaticScaffold::conditional`].
@@ -22,27 +23,26 @@ pub(super) fn scaffold(
     from: Slot,
 ) -> Option<StaticScaffold> {
     // The address of a keyed choice may change.
-    if order.iter().any(|s| matches!(&ops[*s as usize], Op::Draw { keys, .. } if !keys.is_empty()))
-    {
+    if order.iter().any(|s| matches!(&ops[*s], Op::Draw { keys, .. } if !keys.is_empty())) {
         return None;
     }
     let is_closed = reads_inside(ops, from, order);
-    let bits = order.iter().enumerate().filter(|(_, s)| !asked[**s as usize]);
+    let bits = order.iter().enumerate().filter(|(_, s)| !asked[**s]);
     let conditional = bits.fold(0, |all, (i, _)| all | 1 << i);
     let decides = |o: &Operand| matches!(o, Operand::Local(s) if *s == from || order.contains(s));
     let switches =
-        order.iter().any(|s| matches!(&ops[*s as usize], Op::Select { cond, .. } if decides(cond)));
+        order.iter().any(|s| matches!(&ops[*s], Op::Select { cond, .. } if decides(cond)));
     Some(StaticScaffold { slots: order.into(), is_closed, conditional, switches })
 }
 
 /// Returns which slots the effects of their block need whatever the values of conditions.
 pub(super) fn always_asked(ops: &[Op], slots: &[SlotFacts]) -> Vec<bool> {
     let mut asked: Vec<bool> = slots.iter().map(|s| s.is_effect).collect();
-    let mut open: Vec<usize> = (0..slots.len()).filter(|s| asked[*s]).collect();
+    let mut open: Vec<Slot> = (0..slots.len()).map(Slot::new).filter(|s| asked[*s]).collect();
     while let Some(slot) = open.pop() {
         let mut ask = |s: Slot| {
-            if !std::mem::replace(&mut asked[s as usize], true) {
-                open.push(s as usize);
+            if !std::mem::replace(&mut asked[s], true) {
+                open.push(s);
             }
         };
         match (&ops[slot], &slots[slot].reads) {
@@ -59,10 +59,10 @@ pub(super) fn always_asked(ops: &[Op], slots: &[SlotFacts]) -> Vec<bool> {
 /// from frames may have changed because the frames read what changes here.
 fn reads_inside(ops: &[Op], from: Slot, order: &[Slot]) -> bool {
     let mut seen = vec![false; ops.len()];
-    order.iter().chain([&from]).for_each(|s| seen[*s as usize] = true);
+    order.iter().chain([&from]).for_each(|s| seen[*s] = true);
     let mut open = order.to_vec();
     while let Some(slot) = open.pop() {
-        let op = &ops[slot as usize];
+        let op = &ops[slot];
         let mut read: SmallVec<[Operand; 8]> = SmallVec::new();
         op.operands(|o| read.push(o));
         if let Op::Select { then, otherwise, .. } = op {
@@ -74,10 +74,10 @@ fn reads_inside(ops: &[Op], from: Slot, order: &[Slot]) -> bool {
                 Operand::Outer { .. } => return false,
                 Operand::Local(s) => s,
             };
-            if std::mem::replace(&mut seen[s as usize], true) {
+            if std::mem::replace(&mut seen[s], true) {
                 continue;
             }
-            match &ops[s as usize] {
+            match &ops[s] {
                 Op::Param { .. } | Op::Item | Op::Accumulator | Op::Closure(_) => {}
                 Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } => {
                     open.push(s)
@@ -109,15 +109,15 @@ fn visit(
     reached: &mut [bool],
     order: &mut Vec<Slot>,
 ) -> Option<()> {
-    reached[slot as usize] = true;
-    if slots[slot as usize].is_result {
+    reached[slot] = true;
+    if slots[slot].is_result {
         return None;
     }
-    for user in &slots[slot as usize].users {
-        if reached[*user as usize] {
+    for user in &slots[slot].users {
+        if reached[*user] {
             continue;
         }
-        match &ops[*user as usize] {
+        match &ops[*user] {
             Op::Prim { .. }
             | Op::Array(_)
             | Op::Record { .. }
@@ -126,13 +126,13 @@ fn visit(
                 visit(ops, slots, *user, reached, order)?;
             }
             Op::Observe { coarse: None, .. } | Op::Factor { .. } => {
-                reached[*user as usize] = true;
+                reached[*user] = true;
                 order.push(*user);
             }
             // A choice keeps its value when its parameters change, unless its form
             // requires otherwise; that is checked at run time.
             Op::Draw { dist: DistSpec::Family { .. }, .. } => {
-                reached[*user as usize] = true;
+                reached[*user] = true;
                 order.push(*user);
             }
             _ => return None,

@@ -2,7 +2,7 @@
 //! slot, what it reads, whether it is an effect, and the static scaffold and local
 //! density of a choice.
 
-use super::op::Slot;
+use crate::lang::ids::Slot;
 use crate::lang::local_density::LocalDensity;
 
 /// Static facts about a slot.

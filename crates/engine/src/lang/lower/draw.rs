@@ -3,7 +3,7 @@
 use super::lowerer::{AddHint, Lowerer, Typed};
 use super::scope::{Meaning, ScopeKind};
 use crate::lang::builtins::Type;
-use crate::lang::code::{DistSpec, Op, Operand, Slot, Source, SourceKey};
+use crate::lang::code::{BlockId, DistSpec, Op, Operand, Slot, Source, SourceKey};
 use crate::lang::value::Value;
 use pcadlang_numerics::dist::Drawn;
 use pcadlang_syntax::ast::{Expr, ExprKind, Name, Stmt, StmtKind, Tag};
@@ -39,7 +39,7 @@ impl Lowerer<'_> {
     /// Whether a distribution is a multivariate normal that this block makes.
     fn makes_arrays(&self, dist: Operand) -> bool {
         let Operand::Local(slot) = dist else { return false };
-        match self.code.blocks[self.block() as usize].ops.get(slot as usize) {
+        match self.code.blocks[self.block()].ops.get(slot.index()) {
             Some(Op::Prim { builtin, .. }) => self.has_covariance(*builtin),
             _ => false,
         }
@@ -126,9 +126,7 @@ impl Lowerer<'_> {
             .collect();
         let source = Source { loops: through, draw: slot, keys: source_keys };
         let home = self.scopes[outside].block;
-        if let Op::Container { sources, .. } =
-            &mut self.code.blocks[home as usize].ops[container as usize]
-        {
+        if let Op::Container { sources, .. } = &mut self.code.blocks[home].ops[container] {
             let mut all = std::mem::take(sources).into_vec();
             all.push(source);
             *sources = all.into();
@@ -150,7 +148,7 @@ impl Lowerer<'_> {
     /// Returns the occurrence of a container's name.
     /// `z[0] ~ d; for t in 1 .. n { z[t] ~ e; }` draws `@z[0]`, `@z[1]`, …; two elements
     /// with the same address are detected when they are drawn.
-    fn occurrence_of(&mut self, container: (u32, Slot), name: &Arc<str>) -> u32 {
+    fn occurrence_of(&mut self, container: (BlockId, Slot), name: &Arc<str>) -> u32 {
         if let Some(n) = self.bodies.last().and_then(|b| b.containers.get(&container)) {
             return *n;
         }

@@ -141,7 +141,7 @@ impl<'a> Lowerer<'a> {
             errors: Vec::new(),
             modules: vec![Module::default()],
             module: 0,
-            scopes: vec![Scope::new(0, ScopeKind::Root)],
+            scopes: vec![Scope::new(BlockId::ROOT, ScopeKind::Root)],
             bodies: vec![Body::default()],
             pending: Vec::new(),
             blocks: Vec::new(),
@@ -172,19 +172,19 @@ impl<'a> Lowerer<'a> {
 
     /// Returns the block being built.
     pub fn block(&self) -> BlockId {
-        self.scopes.last().map_or(0, |s| s.block)
+        self.scopes.last().map_or(BlockId::ROOT, |s| s.block)
     }
 
     /// Appends an operation to the block being built.
     pub fn push(&mut self, op: Op, span: Span) -> Slot {
         let block = self.block();
-        self.code.blocks[block as usize].push(op, span)
+        self.code.blocks[block].push(op, span)
     }
 
     pub fn new_block(&mut self, kind: BlockKind) -> BlockId {
         let parent = Some(self.block());
         self.code.blocks.push(Block::new(kind, parent));
-        self.code.blocks.len() as BlockId - 1
+        BlockId::new(self.code.blocks.len() - 1)
     }
 
     pub fn constant(&mut self, v: Value) -> Typed {

@@ -67,7 +67,7 @@ pub(super) struct Body {
     pub tags: Vec<SiteTag>,
     /// The occurrence of a container's name, by block and slot: its elements share it,
     /// wherever they are drawn.
-    pub containers: FxHashMap<(u32, Slot), u32>,
+    pub containers: FxHashMap<(BlockId, Slot), u32>,
 }
 
 /// The top-level names of a file, or of files that share a namespace.

@@ -2,7 +2,7 @@
 
 use crate::lang::code::{Block, BlockKind, Callee, Code, Op, Operand};
 use crate::lang::key::Key;
-use crate::lang::value::{Closure, NodeRef, Value};
+use crate::lang::value::{Closure, Value};
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
@@ -21,7 +21,7 @@ impl Graph {
         index: u16,
         default: Option<Operand>,
     ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         if let Some((af, o)) = self.argument(code, n) {
             if let Some(m) = self.unready(af, o) {
                 return self.need(code, m);
@@ -29,7 +29,7 @@ impl Graph {
             let v = self.value(code, af, o).clone();
             return Ok(self.finish(code, n, v));
         }
-        match (&self.frames[frame as usize].args, index) {
+        match (&self.store[frame].args, index) {
             (Arguments::Values(vs), i) if (i as usize) < vs.len() => {
                 let v = vs[i as usize].clone();
                 Ok(self.finish(code, n, v))
@@ -58,31 +58,27 @@ impl Graph {
         code: &Code,
         n: NodeId,
         cond: Operand,
-        then: u32,
-        otherwise: u32,
+        then: BlockId,
+        otherwise: BlockId,
     ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         if let Some(m) = self.unready(frame, cond) {
             return self.need(code, m);
         }
         let block = if self.holds(code, n, cond)? { then } else { otherwise };
-        let keep = match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Child(c)) => self.frames[c.frame as usize].block == block,
+        let keep = match self.store[n].side.as_deref() {
+            Some(Side::Child(c)) => self.store[c.frame].block == block,
             _ => false,
         };
         if !keep {
-            let here = &self.frames[frame as usize];
+            let here = &self.store[frame];
             let child = Frame {
                 block,
                 parent: frame,
                 owner: n,
-                base: 0,
                 path: here.path,
                 depth: here.depth,
-                pass: 0,
-                key: None,
-                args: Arguments::None,
-                attached: true,
+                ..Frame::default()
             };
             self.replace_child(code, n, child)?;
         }
@@ -91,7 +87,7 @@ impl Graph {
 
     /// Whether an evaluated condition holds.
     fn holds(&self, code: &Code, n: NodeId, cond: Operand) -> Result<bool, Failure> {
-        match self.value(code, self.nodes[n as usize].frame, cond) {
+        match self.value(code, self.store[n].frame, cond) {
             Value::Bool(b) => Ok(*b),
             v => Err(self.type_error(code, n, format!("`if` needs a bool, got {}", v.type_name()))),
         }
@@ -105,7 +101,7 @@ impl Graph {
         then: Operand,
         otherwise: Operand,
     ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         if let Some(m) = self.unready(frame, cond) {
             return self.need(code, m);
         }
@@ -114,9 +110,9 @@ impl Graph {
         if let Some(m) = self.unready(frame, chosen) {
             return self.need(code, m);
         }
-        let flags = self.nodes[n as usize].flags;
+        let flags = self.store[n].flags;
         if holds != (flags & OTHERWISE == 0) {
-            self.nodes[n as usize].flags ^= OTHERWISE;
+            self.store[n].flags ^= OTHERWISE;
             if flags & HELD != 0 {
                 let outside = |o| !matches!(o, Operand::Local(_));
                 if let Some(d) = self.resolve(frame, chosen) {
@@ -137,11 +133,11 @@ impl Graph {
         n: NodeId,
         callee: Callee,
         args: &WrittenArgs,
-        site: u32,
+        site: SiteId,
     ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         let closure = match callee {
-            Callee::Static(block) => Closure { block, frame: 0 },
+            Callee::Static(block) => Closure { block, frame: FrameId::ROOT },
             Callee::Value(o) => {
                 if let Some(m) = self.unready(frame, o) {
                     return self.need(code, m);
@@ -164,27 +160,24 @@ impl Graph {
                 }
             }
         };
-        let keep = match self.nodes[n as usize].side.as_deref() {
+        let keep = match self.store[n].side.as_deref() {
             Some(Side::Child(c)) => {
-                let f = &self.frames[c.frame as usize];
+                let f = &self.store[c.frame];
                 f.block == closure.block && f.parent == closure.frame
             }
             _ => false,
         };
         if !keep {
             let arguments = self.match_arguments(code, n, closure.block, args)?;
-            let here = &self.frames[frame as usize];
+            let here = &self.store[frame];
             let child = Frame {
                 block: closure.block,
                 parent: closure.frame,
                 owner: n,
-                base: 0,
                 path: self.site_hash(code, frame, site),
                 depth: here.depth + 1,
-                pass: 0,
-                key: None,
                 args: arguments,
-                attached: true,
+                ..Frame::default()
             };
             self.replace_child(code, n, child)?;
         }
@@ -195,27 +188,26 @@ impl Graph {
     fn replace_child(&mut self, code: &Code, n: NodeId, child: Frame) -> Result<(), Failure> {
         self.let_side_go(code, n);
         let frame = self.make_frame(code, child)?;
-        self.set_side(n, Some(Side::Child(Child { frame, result: NONE })));
+        self.set_side(n, Some(Side::Child(Child { frame, result: NodeId::NONE })));
         Ok(())
     }
 
     /// Takes the value of a call or branch from its child frame.
     fn finish_child(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let Some(Side::Child(child)) = self.nodes[n as usize].side.as_deref() else {
+        let Some(Side::Child(child)) = self.store[n].side.as_deref() else {
             return Ok(self.finish(code, n, Value::Unit));
         };
         let child = *child;
-        let Some(result) = code.blocks[self.frames[child.frame as usize].block as usize].result
-        else {
+        let Some(result) = code.blocks[self.store[child.frame].block].result else {
             return Ok(self.finish(code, n, Value::Unit));
         };
         if let Some(m) = self.unready(child.frame, result) {
             return self.need(code, m);
         }
         let value = self.value(code, child.frame, result).clone();
-        let node = self.resolve(child.frame, result).unwrap_or(NONE);
+        let node = self.resolve(child.frame, result).unwrap_or(NodeId::NONE);
         if child.result != node {
-            if self.nodes[n as usize].flags & HELD != 0 {
+            if self.store[n].flags & HELD != 0 {
                 let outside = !self.is_owned_result(code, node, n);
                 self.acquire(node, n, outside);
             }
@@ -229,11 +221,10 @@ impl Graph {
         &self,
         code: &Code,
         n: NodeId,
-        block: u32,
+        block: BlockId,
         args: &WrittenArgs,
     ) -> Result<Arguments, Failure> {
-        let BlockKind::Function { name, params, required } = &code.blocks[block as usize].kind
-        else {
+        let BlockKind::Function { name, params, required } = &code.blocks[block].kind else {
             return Ok(Arguments::None);
         };
         match match_names(name, params, *required, args.iter().map(|(k, _)| k.as_deref())) {
@@ -250,13 +241,10 @@ impl Graph {
         builtin: u32,
         args: &WrittenArgs,
     ) -> Result<Poll, Failure> {
-        if !matches!(
-            self.nodes[n as usize].side.as_deref(),
-            None | Some(Side::Deps(_) | Side::Kept(_))
-        ) {
+        if !matches!(self.store[n].side.as_deref(), None | Some(Side::Deps(_) | Side::Kept(_))) {
             self.let_side_go(code, n);
         }
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         let b = code.builtins.get(builtin);
         let order = b.match_names(args.iter().map(|(k, _)| k.as_deref()));
         let order = order.map_err(|message| self.type_error(code, n, message))?;
@@ -287,7 +275,7 @@ impl Graph {
         n: NodeId,
         f: Operand,
     ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         if let Some(m) = self.unready(frame, f) {
             return self.need(code, m);
         }
@@ -300,7 +288,7 @@ impl Graph {
             }
         };
         if let (Some(Side::Memo(m)), Value::Memo(_)) =
-            (self.nodes[n as usize].side.as_deref(), &self.nodes[n as usize].value)
+            (self.store[n].side.as_deref(), &self.store[n].value)
             && (m.block, m.parent) == (closure.block, closure.frame)
         {
             return Ok(self.finish_unchanged(code, n));
@@ -309,9 +297,8 @@ impl Graph {
         let memo =
             Memo { block: closure.block, parent: closure.frame, entries: Default::default() };
         self.set_side(n, Some(Side::Memo(memo)));
-        self.version += 1;
-        let version = self.version;
-        Ok(self.finish(code, n, Value::Memo(NodeRef { node: n, version })))
+        let made = self.store.new_version(n);
+        Ok(self.finish(code, n, Value::Memo(made)))
     }
 
     /// Evaluates a call through `mem`: finds or creates the entry for its arguments.
@@ -322,7 +309,7 @@ impl Graph {
         memo: NodeId,
         args: &WrittenArgs,
     ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         let operands: SmallVec<[Operand; 4]> = args.iter().map(|(_, o)| *o).collect();
         if let Some(step) = self.await_plain(code, n, frame, &operands)? {
             return Ok(step);
@@ -338,42 +325,45 @@ impl Graph {
             return Err(self.type_error(code, n, message.into()));
         };
         let key = if keys.len() == 1 { keys[0].clone() } else { Key::List(keys.into()) };
-        let same = match self.nodes[n as usize].side.as_deref() {
+        let same = match self.store[n].side.as_deref() {
             Some(Side::MemoCall(c)) => c.memo == memo && c.key == key,
             _ => false,
         };
         if !same {
             let entry = self.enter_memo(code, n, memo, &key, &values, args)?;
             self.let_side_go(code, n);
-            if self.nodes[n as usize].flags & HELD != 0 {
+            if self.store[n].flags & HELD != 0 {
                 deps.iter().for_each(|d| self.acquire(*d, n, true));
             }
-            self.set_side(n, Some(Side::MemoCall(MemoCall { memo, key, result: NONE, deps })));
-            debug_assert!(self.frames[entry as usize].attached);
+            self.set_side(
+                n,
+                Some(Side::MemoCall(MemoCall { memo, key, result: NodeId::NONE, deps })),
+            );
+            debug_assert!(self.store[entry].attached);
         }
         self.finish_memo(code, n)
     }
 
     fn finish_memo(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let Some(Side::MemoCall(call)) = self.nodes[n as usize].side.as_deref() else {
+        let Some(Side::MemoCall(call)) = self.store[n].side.as_deref() else {
             return Ok(self.finish(code, n, Value::Unit));
         };
         let call = call.clone();
-        let entry = match self.nodes[call.memo as usize].side.as_deref() {
+        let entry = match self.store[call.memo].side.as_deref() {
             Some(Side::Memo(m)) => m.entries.get(&call.key).map(|e| e.0),
             _ => None,
         };
         let Some(entry) = entry else { return Ok(self.finish(code, n, Value::Unit)) };
-        let Some(result) = code.blocks[self.frames[entry as usize].block as usize].result else {
+        let Some(result) = code.blocks[self.store[entry].block].result else {
             return Ok(self.finish(code, n, Value::Unit));
         };
         if let Some(m) = self.unready(entry, result) {
             return self.need(code, m);
         }
         let value = self.value(code, entry, result).clone();
-        let node = self.resolve(entry, result).unwrap_or(NONE);
+        let node = self.resolve(entry, result).unwrap_or(NodeId::NONE);
         if call.result != node {
-            if self.nodes[n as usize].flags & HELD != 0 {
+            if self.store[n].flags & HELD != 0 {
                 self.acquire(node, n, true);
             }
             self.set_side(n, Some(Side::MemoCall(MemoCall { result: node, ..call })));
@@ -391,7 +381,7 @@ impl Graph {
         values: &[Value],
         args: &WrittenArgs,
     ) -> Result<FrameId, Failure> {
-        let Some(Side::Memo(m)) = self.nodes[memo as usize].side.as_deref() else {
+        let Some(Side::Memo(m)) = self.store[memo].side.as_deref() else {
             return Err(self.type_error(code, n, "this `mem` function no longer exists".into()));
         };
         let (block, parent) = (m.block, m.parent);
@@ -409,7 +399,7 @@ impl Graph {
                 let Op::Mem { site, .. } = self.op(code, memo) else {
                     return Err(self.type_error(code, n, "not a `mem` function".into()));
                 };
-                let home = self.nodes[memo as usize].frame;
+                let home = self.store[memo].frame;
                 // The values that the key stands for: calls with 0 and -0 share one
                 // entry, and the result must not depend on which came first.
                 let values: Arc<[Value]> = match key {
@@ -422,43 +412,41 @@ impl Graph {
                     block,
                     parent,
                     owner: memo,
-                    base: 0,
                     path: self.keyed_site_hash(code, home, *site, key),
-                    depth: self.frames[self.nodes[n as usize].frame as usize].depth + 1,
-                    pass: 0,
+                    depth: self.store[self.store[n].frame].depth + 1,
                     key: Some(key.clone()),
                     args: Arguments::Values(values),
-                    attached: true,
+                    ..Frame::default()
                 };
                 (self.make_frame(code, frame)?, 1)
             }
         };
-        if let Some(Side::Memo(m)) = self.nodes[memo as usize].side.as_deref_mut() {
+        if let Some(Side::Memo(m)) = self.store[memo].side.as_deref_mut() {
             m.entries.insert(key.clone(), new);
         }
-        self.note(Entry::Memo(memo, key.clone(), old));
+        self.update.note(Entry::Memo(memo, key.clone(), old));
         Ok(new.0)
     }
 
     /// Removes a call from an entry; an entry without calls is dropped at the end of the
     /// update.
     pub(crate) fn leave_memo(&mut self, memo: NodeId, key: &Key) {
-        let Some(Side::Memo(m)) = self.nodes[memo as usize].side.as_deref_mut() else { return };
+        let Some(Side::Memo(m)) = self.store[memo].side.as_deref_mut() else { return };
         let Some(entry) = m.entries.get_mut(key) else { return };
         let old = *entry;
         entry.1 -= 1;
         if entry.1 == 0 {
-            self.idle.push((memo, key.clone()));
+            self.update.idle.push((memo, key.clone()));
         }
-        self.note(Entry::Memo(memo, key.clone(), Some(old)));
+        self.update.note(Entry::Memo(memo, key.clone(), Some(old)));
     }
 
     /// Drops an entry that still has no calls.
     pub(crate) fn drop_idle(&mut self, code: &Code, memo: NodeId, key: &Key) {
-        let Some(Side::Memo(m)) = self.nodes[memo as usize].side.as_deref_mut() else { return };
+        let Some(Side::Memo(m)) = self.store[memo].side.as_deref_mut() else { return };
         let Some(&(frame, 0)) = m.entries.get(key) else { return };
         m.entries.remove(key);
-        self.note(Entry::Memo(memo, key.clone(), Some((frame, 0))));
+        self.update.note(Entry::Memo(memo, key.clone(), Some((frame, 0))));
         self.detach(code, frame);
     }
 }

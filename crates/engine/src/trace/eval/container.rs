@@ -3,7 +3,7 @@
 use crate::lang::code::{Code, Op, Operand, Source, SourceKey};
 use crate::lang::error::FaultKind;
 use crate::lang::key::Key;
-use crate::lang::value::{NodeRef, Value};
+use crate::lang::value::Value;
 use crate::trace::graph::Graph;
 use crate::trace::node::*;
 use crate::trace::update::{Failure, Poll};
@@ -32,13 +32,13 @@ impl Graph {
         n: NodeId,
         sources: &[Source],
     ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         let mut deps = Deps::new();
         let entries = if let [Source { loops, keys, .. }] = sources
             && let ([slot], [SourceKey::Loop(0)]) = (&loops[..], &keys[..])
         {
-            let outer = self.frames[frame as usize].base + slot;
-            if self.nodes[outer as usize].state != State::Clean {
+            let outer = self.store[frame].base + *slot;
+            if self.store[outer].state != State::Clean {
                 return self.need(code, outer);
             }
             deps.push(outer);
@@ -62,9 +62,9 @@ impl Graph {
             }
             Some(Arc::new(entries))
         };
-        let structure_changed = deps.iter().any(|d| self.nodes[*d as usize].changed == self.epoch);
-        let keep = self.nodes[n as usize].flags & WAS_STALE != 0 && !structure_changed;
-        let held = self.nodes[n as usize].flags & HELD != 0;
+        let structure_changed = deps.iter().any(|d| self.store[*d].changed == self.update.epoch);
+        let keep = self.store[n].flags & WAS_STALE != 0 && !structure_changed;
+        let held = self.store[n].flags & HELD != 0;
         if held {
             deps.iter().for_each(|d| self.acquire(*d, n, true));
         }
@@ -73,9 +73,8 @@ impl Graph {
         if keep {
             return Ok(self.finish_unchanged(code, n));
         }
-        self.version += 1;
-        let version = self.version;
-        Ok(self.finish(code, n, Value::Container(NodeRef { node: n, version })))
+        let made = self.store.new_version(n);
+        Ok(self.finish(code, n, Value::Container(made)))
     }
 
     /// Walks the loops of a source and adds each key.
@@ -92,12 +91,12 @@ impl Graph {
         entries: &mut IndexMap<SmallVec<[Key; 1]>, Element>,
     ) -> Result<Option<Poll>, Failure> {
         if let Some(slot) = source.loops.get(passes.len()) {
-            let node = self.frames[frame as usize].base + slot;
-            if self.nodes[node as usize].state != State::Clean {
+            let node = self.store[frame].base + *slot;
+            if self.store[node].state != State::Clean {
                 return self.need(code, node).map(Some);
             }
             deps.push(node);
-            let count = match self.nodes[node as usize].side.as_deref() {
+            let count = match self.store[node].side.as_deref() {
                 Some(Side::Loop(l)) => l.frames.len(),
                 _ => 0,
             };
@@ -118,9 +117,9 @@ impl Graph {
                 SourceKey::Loop(level) => {
                     let mut f = frame;
                     for _ in *level as usize + 1..source.loops.len() {
-                        f = self.nodes[self.frames[f as usize].owner as usize].frame;
+                        f = self.store[self.store[f].owner].frame;
                     }
-                    let key = self.frames[f as usize].key.clone();
+                    let key = self.store[f].key.clone();
                     key.ok_or_else(|| {
                         self.type_error(code, n, "this iteration of the loop has no key".into())
                     })?
@@ -148,7 +147,7 @@ impl Graph {
 
     /// Finds the element of a container for a key.
     fn find(&mut self, code: &Code, container: NodeId, keys: &[Key]) -> Result<Found, Failure> {
-        match self.nodes[container as usize].side.as_deref() {
+        match self.store[container].side.as_deref() {
             Some(Side::Loop(l)) => {
                 let [key] = keys else { return Ok(Found::Missing) };
                 // Results of a map over names can be indexed by name and by position.
@@ -162,15 +161,14 @@ impl Graph {
                     return Ok(Found::Missing);
                 };
                 let ([key], source) = (keys, &sources[0]) else { return Ok(Found::Missing) };
-                let outer = self.frames[self.nodes[container as usize].frame as usize].base
-                    + source.loops[0];
-                let pass = match self.nodes[outer as usize].side.as_deref() {
+                let outer = self.store[self.store[container].frame].base + source.loops[0];
+                let pass = match self.store[outer].side.as_deref() {
                     Some(Side::Loop(l)) => l.keys.find(key),
                     _ => None,
                 };
                 let Some(pass) = pass else { return Ok(Found::Missing) };
                 let f = self.pass_frame(code, outer, pass)?;
-                Ok(Found::Place(Place::Node(self.frames[f as usize].base + source.draw)))
+                Ok(Found::Place(Place::Node(self.store[f].base + source.draw)))
             }
             Some(Side::Table(Table { entries: Some(entries), .. })) => {
                 let Some(element) = entries.get(keys).cloned() else { return Ok(Found::Missing) };
@@ -189,18 +187,18 @@ impl Graph {
     ) -> Result<NodeId, Failure> {
         let Op::Container { sources, .. } = self.op(code, container) else { return Ok(container) };
         let source = &sources[element.source as usize];
-        let mut frame = self.nodes[container as usize].frame;
+        let mut frame = self.store[container].frame;
         for (slot, pass) in source.loops.iter().zip(&element.passes) {
-            let outer = self.frames[frame as usize].base + slot;
+            let outer = self.store[frame].base + *slot;
             frame = self.pass_frame(code, outer, *pass as usize)?;
         }
-        Ok(self.frames[frame as usize].base + source.draw)
+        Ok(self.store[frame].base + source.draw)
     }
 
     /// Returns the location of the result of a pass of a `map`.
     fn map_result(&mut self, code: &Code, owner: NodeId, pass: usize) -> Result<Place, Failure> {
         let f = self.pass_frame(code, owner, pass)?;
-        let result = code.blocks[self.frames[f as usize].block as usize].result;
+        let result = code.blocks[self.store[f].block].result;
         Ok(match result {
             Some(o) => self.resolve(f, o).map_or(Place::Constant(o), Place::Node),
             None => Place::Constant(Operand::Const(0)),
@@ -209,12 +207,12 @@ impl Graph {
 
     /// Reads all elements of the container in the preceding slot.
     pub(super) fn evaluate_gather(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let container = n - 1;
-        if self.nodes[container as usize].state != State::Clean {
+        let container = n.container();
+        if self.store[container].state != State::Clean {
             return self.need(code, container);
         }
         let mut places: Vec<(Option<Key>, Place)> = Vec::new();
-        match self.nodes[container as usize].side.as_deref() {
+        match self.store[container].side.as_deref() {
             Some(Side::Loop(l)) => {
                 let keys = l.keys.clone();
                 let named = matches!(&keys, Keys::Listed { keys, .. } if keys.iter().all(|k| matches!(k, Key::Str(_))));
@@ -243,7 +241,7 @@ impl Graph {
         let mut deps: Deps = smallvec![];
         for (_, p) in &places {
             let Place::Node(m) = p else { continue };
-            match self.nodes[*m as usize].state {
+            match self.store[*m].state {
                 State::Clean => {}
                 _ => {
                     self.need(code, *m)?;
@@ -259,23 +257,23 @@ impl Graph {
         let mut nested: Deps = smallvec![];
         for (_, p) in &places {
             let v = match p {
-                Place::Node(m) => &self.nodes[*m as usize].value,
+                Place::Node(m) => &self.store[*m].value,
                 Place::Constant(Operand::Const(i)) => code.const_value(*i),
                 Place::Constant(_) => &Value::Unit,
             };
             if let Value::Container(r) = v {
-                nested.push(r.node + 1);
+                nested.push(r.node.gather());
             }
             values.push(v.clone());
         }
         for m in &nested {
-            if self.nodes[*m as usize].state != State::Clean {
+            if self.store[*m].state != State::Clean {
                 return self.need(code, *m);
             }
         }
         for v in &mut values {
             if let Value::Container(r) = v {
-                *v = self.nodes[r.node as usize + 1].value.clone();
+                *v = self.store[r.node.gather()].value.clone();
             }
         }
         deps.extend(nested);
@@ -303,9 +301,8 @@ impl Graph {
         let Op::Container { sources, .. } = self.op(code, container) else {
             return IndexMap::new();
         };
-        let outer =
-            self.frames[self.nodes[container as usize].frame as usize].base + sources[0].loops[0];
-        match self.nodes[outer as usize].side.as_deref() {
+        let outer = self.store[self.store[container].frame].base + sources[0].loops[0];
+        match self.store[outer].side.as_deref() {
             Some(Side::Loop(l)) => (0..l.keys.len())
                 .map(|i| {
                     (smallvec![l.keys.get(i)], Element { source: 0, passes: smallvec![i as u32] })
@@ -322,7 +319,7 @@ impl Graph {
         base: Operand,
         keys: &[Operand],
     ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         if let Some(step) = self.await_all(code, frame, &[base])? {
             return Ok(step);
         }
@@ -333,26 +330,26 @@ impl Graph {
             return self.need(code, m);
         }
         if let Some(m) = self.element_read_before(code, n, base, keys) {
-            if self.nodes[m as usize].state != State::Clean {
+            if self.store[m].state != State::Clean {
                 return self.need(code, m);
             }
-            let value = self.nodes[m as usize].value.clone();
+            let value = self.store[m].value.clone();
             return Ok(self.finish(code, n, value));
         }
         let mut value = self.value(code, frame, base).clone();
         while !rest.is_empty() {
             if let Value::Container(r) = value {
                 let container = r.node;
-                if self.nodes[container as usize].state != State::Clean {
+                if self.store[container].state != State::Clean {
                     return self.need(code, container);
                 }
                 if matches!(rest[0], Value::Array(_) | Value::List(_)) {
                     // Several elements at once: read the container as a whole.
-                    if self.nodes[container as usize + 1].state != State::Clean {
-                        return self.need(code, container + 1);
+                    if self.store[container.gather()].state != State::Clean {
+                        return self.need(code, container.gather());
                     }
-                    deps.push(container + 1);
-                    value = self.nodes[container as usize + 1].value.clone();
+                    deps.push(container.gather());
+                    value = self.store[container.gather()].value.clone();
                     continue;
                 }
                 let width = self.key_width(code, container).min(rest.len());
@@ -371,11 +368,11 @@ impl Graph {
                     Place::Constant(Operand::Const(i)) => code.const_value(i).clone(),
                     Place::Constant(_) => Value::Unit,
                     Place::Node(m) => {
-                        if self.nodes[m as usize].state != State::Clean {
+                        if self.store[m].state != State::Clean {
                             return self.need(code, m);
                         }
                         deps.push(m);
-                        self.nodes[m as usize].value.clone()
+                        self.store[m].value.clone()
                     }
                 };
                 rest.drain(..width);
@@ -400,30 +397,22 @@ impl Graph {
         base: Operand,
         keys: &[Operand],
     ) -> Option<NodeId> {
-        let node = &self.nodes[n as usize];
+        let node = &self.store[n];
         let Value::Container(r) = self.value(code, node.frame, base) else { return None };
         let Some(Side::Deps(deps)) = node.side.as_deref() else { return None };
         let as_it_was = |d: NodeId| {
-            let d = &self.nodes[d as usize];
-            d.state == State::Clean && d.changed != self.epoch
+            let d = &self.store[d];
+            d.state == State::Clean && d.changed != self.update.epoch
         };
         let all = keys.iter().chain([&base]).filter_map(|o| self.resolve(node.frame, *o));
         let same =
             node.flags & WAS_STALE != 0 && as_it_was(r.node) && all.into_iter().all(as_it_was);
-        (same && deps.len() == 1 && deps[0] != r.node + 1).then(|| deps[0])
-    }
-
-    /// Returns the number of keys of an element of a container.
-    pub(crate) fn key_width(&self, code: &Code, container: NodeId) -> usize {
-        match self.op(code, container) {
-            Op::Container { sources, .. } => sources[0].keys.len(),
-            _ => 1,
-        }
+        (same && deps.len() == 1 && deps[0] != r.node.gather()).then(|| deps[0])
     }
 
     fn missing(&self, code: &Code, n: NodeId, container: NodeId, keys: &[Key]) -> Failure {
         let shown = keys.iter().map(|k| format!("[{k}]")).collect::<String>();
-        let known: Vec<String> = match self.nodes[container as usize].side.as_deref() {
+        let known: Vec<String> = match self.store[container].side.as_deref() {
             Some(Side::Loop(l)) => {
                 (0..l.keys.len().min(100)).map(|i| l.keys.get(i).to_string()).collect()
             }

@@ -3,7 +3,7 @@
 use crate::lang::code::{BlockKind, Code, Op, Operand};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::key::Key;
-use crate::lang::value::{NodeRef, Value};
+use crate::lang::value::Value;
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
@@ -15,12 +15,12 @@ use std::sync::Arc;
 impl Graph {
     /// Evaluates the element of a pass.
     pub(super) fn evaluate_item(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let frame = &self.frames[self.nodes[n as usize].frame as usize];
+        let frame = &self.store[self.store[n].frame];
         let (owner, pass) = (frame.owner, frame.pass as usize);
-        if self.nodes[owner as usize].state == State::Stale {
+        if self.store[owner].state == State::Stale {
             return self.need(code, owner);
         }
-        let value = match self.nodes[owner as usize].side.as_deref() {
+        let value = match self.store[owner].side.as_deref() {
             Some(Side::Loop(l)) => l.items.element(pass).unwrap_or_default(),
             _ => Value::Unit,
         };
@@ -29,9 +29,9 @@ impl Graph {
 
     /// Evaluates the running value of a `fold` before a pass.
     pub(super) fn evaluate_accumulator(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let frame = &self.frames[self.nodes[n as usize].frame as usize];
+        let frame = &self.store[self.store[n].frame];
         let (owner, pass) = (frame.owner, frame.pass as usize);
-        let home = self.nodes[owner as usize].frame;
+        let home = self.store[owner].frame;
         let (from, operand) = if pass == 0 {
             let Op::Fold { init, .. } = self.op(code, owner) else {
                 return Ok(self.finish(code, n, Value::Unit));
@@ -39,7 +39,7 @@ impl Graph {
             (home, *init)
         } else {
             let previous = self.pass_frame(code, owner, pass - 1)?;
-            match code.blocks[self.frames[previous as usize].block as usize].result {
+            match code.blocks[self.store[previous].block].result {
                 Some(r) => (previous, r),
                 None => return Ok(self.finish(code, n, Value::Unit)),
             }
@@ -57,9 +57,9 @@ impl Graph {
         code: &Code,
         n: NodeId,
         iter: Operand,
-        body: u32,
+        body: BlockId,
     ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         if let Some(step) = self.await_plain(code, n, frame, &[iter])? {
             return Ok(step);
         }
@@ -95,9 +95,9 @@ impl Graph {
         n: NodeId,
         f: Operand,
         over: Operand,
-        _site: u32,
+        _site: SiteId,
     ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         if let Some(step) = self.await_all(code, frame, &[f])? {
             return Ok(step);
         }
@@ -125,7 +125,7 @@ impl Graph {
                     }
                     _ => Value::from_elements(results),
                 };
-                if matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Loop(_))) {
+                if matches!(self.store[n].side.as_deref(), Some(Side::Loop(_))) {
                     self.let_side_go(code, n);
                 }
                 self.set_deps(n, deps);
@@ -153,9 +153,9 @@ impl Graph {
         f: Operand,
         init: Operand,
         over: Operand,
-        _site: u32,
+        _site: SiteId,
     ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         if let Some(step) = self.await_all(code, frame, &[f])? {
             return Ok(step);
         }
@@ -177,7 +177,7 @@ impl Graph {
         };
         self.check_callback(code, n, "fold", block, 2)?;
         self.set_loop(code, n, keys, items, block, parent, deps)?;
-        let passes = match self.nodes[n as usize].side.as_deref() {
+        let passes = match self.store[n].side.as_deref() {
             Some(Side::Loop(l)) => l.frames.len(),
             _ => 0,
         };
@@ -188,7 +188,7 @@ impl Graph {
                 // next.
                 self.make_all_passes(code, n)?;
                 let f = self.pass_frame(code, n, last)?;
-                (f, code.blocks[self.frames[f as usize].block as usize].result)
+                (f, code.blocks[self.store[f].block].result)
             }
         };
         let Some(operand) = operand else { return Ok(self.finish(code, n, Value::Unit)) };
@@ -196,16 +196,16 @@ impl Graph {
             return self.need(code, m);
         }
         let value = self.value(code, from, operand).clone();
-        let result = self.resolve(from, operand).unwrap_or(NONE);
-        if let Some(Side::Loop(l)) = self.nodes[n as usize].side.as_deref()
+        let result = self.resolve(from, operand).unwrap_or(NodeId::NONE);
+        if let Some(Side::Loop(l)) = self.store[n].side.as_deref()
             && l.result != result
         {
             let mut l = l.clone();
-            if self.nodes[n as usize].flags & HELD != 0 {
-                if result != NONE {
+            if self.store[n].flags & HELD != 0 {
+                if result != NodeId::NONE {
                     self.acquire(result, n, true);
                 }
-                if l.result != NONE {
+                if l.result != NodeId::NONE {
                     self.release(l.result, true);
                 }
             }
@@ -220,10 +220,10 @@ impl Graph {
         code: &Code,
         n: NodeId,
         what: &str,
-        block: u32,
+        block: BlockId,
         takes: usize,
     ) -> Result<(), Failure> {
-        match code.blocks[block as usize].signature() {
+        match code.blocks[block].signature() {
             Some((_, params, required)) if params.len() >= takes && required <= takes => Ok(()),
             Some((name, params, _)) => {
                 let message = format!(
@@ -245,12 +245,12 @@ impl Graph {
         n: NodeId,
         keys: Keys,
         items: Value,
-        block: u32,
+        block: BlockId,
         parent: FrameId,
         deps: Deps,
     ) -> Result<(), Failure> {
-        let held = self.nodes[n as usize].flags & HELD != 0;
-        let old = match self.nodes[n as usize].side.as_deref() {
+        let held = self.store[n].flags & HELD != 0;
+        let old = match self.store[n].side.as_deref() {
             Some(Side::Loop(l)) => Some(l.clone()),
             _ => {
                 self.let_side_go(code, n);
@@ -270,20 +270,19 @@ impl Graph {
             }
             return Ok(());
         }
-        let mut frames = vec![NONE; keys.len()];
-        let mut result = NONE;
+        let mut frames = vec![FrameId::NONE; keys.len()];
+        let mut result = NodeId::NONE;
         if held {
             deps.iter().for_each(|d| self.acquire(*d, n, true));
         }
         if let Some(old) = old {
             let same = (old.block, old.parent) == (block, parent);
-            for (i, f) in old.frames.iter().enumerate().filter(|(_, f)| **f != NONE) {
+            for (i, f) in old.frames.iter().enumerate().filter(|(_, f)| **f != FrameId::NONE) {
                 match keys.find(&old.keys.get(i)).filter(|_| same) {
                     Some(j) => {
                         frames[j] = *f;
-                        let before =
-                            std::mem::replace(&mut self.frames[*f as usize].pass, j as u32);
-                        self.note(Entry::PassMoved(*f, before));
+                        let before = std::mem::replace(&mut self.store[*f].pass, j as u32);
+                        self.update.note(Entry::PassMoved(*f, before));
                     }
                     None => self.detach(code, *f),
                 }
@@ -297,16 +296,15 @@ impl Graph {
             n,
             Some(Side::Loop(Loop { keys, items, frames, block, parent, result, deps })),
         );
-        self.version += 1;
-        let version = self.version;
-        if let Some(Side::Loop(_)) = self.nodes[n as usize].side.as_deref()
+        let made = self.store.new_version(n);
+        if let Some(Side::Loop(_)) = self.store[n].side.as_deref()
             && !matches!(self.op(code, n), Op::Fold { .. })
         {
             // The value is a reference with the new version, so that users see that the
             // structure changed.
-            let node = &mut self.nodes[n as usize];
-            node.value = Value::Container(NodeRef { node: n, version });
-            node.changed = self.epoch;
+            let node = &mut self.store[n];
+            node.value = Value::Container(made);
+            node.changed = self.update.epoch;
         }
         Ok(())
     }
@@ -317,7 +315,7 @@ impl Graph {
     }
 
     fn make_all_passes(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
-        let passes = match self.nodes[n as usize].side.as_deref() {
+        let passes = match self.store[n].side.as_deref() {
             Some(Side::Loop(l)) => l.frames.len(),
             _ => 0,
         };
@@ -334,7 +332,7 @@ impl Graph {
         owner: NodeId,
         pass: usize,
     ) -> Result<FrameId, Failure> {
-        let Some(Side::Loop(l)) = self.nodes[owner as usize].side.as_deref() else {
+        let Some(Side::Loop(l)) = self.store[owner].side.as_deref() else {
             return Err(self.fail(
                 code,
                 owner,
@@ -343,12 +341,12 @@ impl Graph {
                 None,
             ));
         };
-        if l.frames[pass] != NONE {
+        if l.frames[pass] != FrameId::NONE {
             return Ok(l.frames[pass]);
         }
         let (block, parent, key) = (l.block, l.parent, l.keys.get(pass));
-        let home = self.nodes[owner as usize].frame;
-        let here = &self.frames[home as usize];
+        let home = self.store[owner].frame;
+        let here = &self.store[home];
         let (path, depth, args) = match self.op(code, owner) {
             Op::Map { site, .. } => {
                 (self.keyed_site_hash(code, home, *site, &key), here.depth + 1, Arguments::Item)
@@ -358,24 +356,23 @@ impl Graph {
             }
             _ => (here.path, here.depth, Arguments::None),
         };
-        debug_assert!(!matches!(code.blocks[block as usize].kind, BlockKind::Root));
+        debug_assert!(!matches!(code.blocks[block].kind, BlockKind::Root));
         let frame = Frame {
             block,
             parent,
             owner,
-            base: 0,
             path,
             depth,
             pass: pass as u32,
             key: Some(key),
             args,
-            attached: true,
+            ..Frame::default()
         };
         let f = self.make_frame(code, frame)?;
-        if let Some(Side::Loop(l)) = self.nodes[owner as usize].side.as_deref_mut() {
+        if let Some(Side::Loop(l)) = self.store[owner].side.as_deref_mut() {
             l.frames[pass] = f;
         }
-        self.note(Entry::PassMade(owner, pass as u32));
+        self.update.note(Entry::PassMade(owner, pass as u32));
         Ok(f)
     }
 }

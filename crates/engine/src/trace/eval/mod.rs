@@ -13,14 +13,13 @@ use super::node::*;
 use super::update::{Failure, Poll};
 use crate::lang::builtins::{Builtin, PreviousEvaluation};
 use crate::lang::code::{Code, Op, Operand};
-use crate::lang::error::{Fault, FaultKind};
+use crate::lang::error::Fault;
 use crate::lang::value::{Closure, Value};
-use smallvec::SmallVec;
 
 impl Graph {
     /// Makes one attempt to run the operation of a node.
     pub(super) fn run_op(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         match self.op(code, n) {
             Op::Param { index, default } => self.evaluate_param(code, n, *index, *default),
             Op::Item => self.evaluate_item(code, n),
@@ -81,15 +80,10 @@ impl Graph {
             Op::Observe { dist, value, .. } => self.evaluate_observe(code, n, dist, *value),
             Op::Factor { weight, .. } => self.evaluate_factor(code, n, *weight),
             Op::Probe(p) => {
-                let value = self.probe(*p);
+                let value = self.score.probe(*p);
                 Ok(self.finish(code, n, Value::Num(value)))
             }
         }
-    }
-
-    /// Returns the node to wait for before an operand can be read.
-    pub(super) fn unready(&self, frame: FrameId, o: Operand) -> Option<NodeId> {
-        self.resolve(frame, o).filter(|n| self.nodes[*n as usize].state != State::Clean)
     }
 
     /// Waits for operands; `None` if all are ready.
@@ -120,67 +114,13 @@ impl Graph {
                 return self.need(code, m).map(Some);
             }
             if let Value::Container(r) = self.value(code, frame, *o)
-                && self.nodes[r.node as usize + 1].state != State::Clean
+                && self.store[r.node.gather()].state != State::Clean
             {
-                let gather = r.node + 1;
+                let gather = r.node.gather();
                 return self.need(code, gather).map(Some);
             }
         }
         Ok(None)
-    }
-
-    /// Returns the values of operands, with containers read as arrays or records, or else
-    /// the node to wait for.
-    pub(crate) fn inputs<'a>(
-        &'a self,
-        code: &'a Code,
-        frame: FrameId,
-        operands: &[Operand],
-        deps: &mut Deps,
-    ) -> Result<SmallVec<[&'a Value; 4]>, NodeId> {
-        let mut values = SmallVec::new();
-        for o in operands {
-            let value = match self.resolve(frame, *o) {
-                None => self.value(code, frame, *o),
-                Some(m) => {
-                    let node = &self.nodes[m as usize];
-                    if node.state != State::Clean {
-                        return Err(m);
-                    }
-                    &node.value
-                }
-            };
-            values.push(match value {
-                Value::Container(r) => {
-                    let gather = &self.nodes[r.node as usize + 1];
-                    if gather.state != State::Clean {
-                        return Err(r.node + 1);
-                    }
-                    deps.push(r.node + 1);
-                    &gather.value
-                }
-                v => v,
-            });
-        }
-        Ok(values)
-    }
-
-    /// Returns the value of an operand, with a container read as an array or record;
-    /// nodes read for that are added to `deps`.
-    pub(super) fn plain<'a>(
-        &'a self,
-        code: &'a Code,
-        frame: FrameId,
-        o: Operand,
-        deps: &mut Deps,
-    ) -> &'a Value {
-        match self.value(code, frame, o) {
-            Value::Container(r) => {
-                deps.push(r.node + 1);
-                &self.nodes[r.node as usize + 1].value
-            }
-            v => v,
-        }
     }
 
     /// Calls a built-in at a node; an incremental function continues from its previous
@@ -216,16 +156,6 @@ impl Graph {
                 self.finish_made(code, n, value)
             }
         }
-    }
-
-    /// Turns a fault of a built-in into an error at a node.
-    pub(super) fn fault(&self, code: &Code, n: NodeId, f: Fault) -> Failure {
-        self.fail(code, n, f.kind, f.message, f.hint)
-    }
-
-    /// Builds a type error at a node.
-    pub(super) fn type_error(&self, code: &Code, n: NodeId, message: String) -> Failure {
-        self.fail(code, n, FaultKind::Type, message, None)
     }
 }
 

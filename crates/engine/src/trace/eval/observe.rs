@@ -19,98 +19,49 @@ impl Graph {
         spec: &DistSpec,
         value: Operand,
     ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         let mut deps = Deps::new();
         // Observing a view renders a picture.
         if matches!(spec, DistSpec::Value(_)) {
-            self.spent.count_large();
+            self.budget.count_large();
         }
         let score = match self.observation_score(code, n, frame, spec, value, &mut deps) {
             Ok(score) => score?,
             Err(m) => return self.need(code, m),
         };
-        let stale = self.nodes[n as usize].flags & WAS_STALE != 0;
+        let stale = self.store[n].flags & WAS_STALE != 0;
         if stale {
             self.retire_score(n);
         }
         match score {
             Score::One(score) => {
-                self.likelihood.add(score);
-                self.nodes[n as usize].score = score;
-                if matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Total(_)))
-                    || !deps.is_empty()
+                self.score.likelihood.add(score);
+                self.store[n].score = score;
+                if matches!(self.store[n].side.as_deref(), Some(Side::Total(_))) || !deps.is_empty()
                 {
                     self.set_total(n, ExactSum::default());
                 }
             }
             Score::Sum(sum) => {
-                self.likelihood.merge(&sum);
-                self.nodes[n as usize].score = 0.0;
+                self.score.likelihood.merge(&sum);
+                self.store[n].score = 0.0;
                 self.set_total(n, sum);
             }
         }
         self.set_deps(n, deps);
-        self.nodes[n as usize].flags &= !TARGET;
+        self.store[n].flags &= !TARGET;
         Ok(self.finish(code, n, Value::Unit))
     }
 
     /// Stores the total of an observation's elements.
     fn set_total(&mut self, n: NodeId, sum: ExactSum) {
-        match self.nodes[n as usize].side.as_deref_mut() {
+        match self.store[n].side.as_deref_mut() {
             Some(Side::Total(t)) => {
                 let old = std::mem::replace(&mut t.sum, sum);
-                self.note(Entry::Sum(n, old));
+                self.update.note(Entry::Sum(n, old));
             }
             _ => self.set_side(n, Some(Side::Total(Total { sum, deps: Deps::new() }))),
         }
-    }
-
-    /// Scores an observation, or returns the node to wait for.
-    fn observation_score(
-        &self,
-        code: &Code,
-        n: NodeId,
-        frame: FrameId,
-        spec: &DistSpec,
-        value: Operand,
-        deps: &mut Deps,
-    ) -> Result<Result<Score, Failure>, NodeId> {
-        let values = self.inputs(code, frame, spec.operands(), deps)?;
-        let observed = match self.replaced(code, n) {
-            Some(v) => v,
-            None => self.inputs(code, frame, &[value], deps)?[0],
-        };
-        Ok(self.score_of_values(code, n, spec, &values, observed))
-    }
-
-    /// Returns the score of an observation with these parameters.
-    pub(crate) fn score_of_values(
-        &self,
-        code: &Code,
-        n: NodeId,
-        spec: &DistSpec,
-        values: &[&Value],
-        observed: &Value,
-    ) -> Result<Score, Failure> {
-        if let DistSpec::Value(_) = spec {
-            match values[0] {
-                Value::Dist(_) => {}
-                v @ Value::Likelihood(_) => {
-                    return likelihood_score(v, observed)
-                        .map(Score::One)
-                        .map_err(|f| self.fault(code, n, f));
-                }
-                v => {
-                    let message = format!(
-                        "`observe` needs a distribution or likelihood, got {}",
-                        v.type_name()
-                    );
-                    return Err(self.type_error(code, n, message));
-                }
-            }
-        }
-        let dist = self.dist_of_values(code, n, spec, values)?;
-        density::score(&dist, observed).map_err(|f| self.fault(code, n, f))
     }
 
     /// Returns the log density of an observation's coarse surrogate, which is never part
@@ -120,7 +71,7 @@ impl Graph {
         code: &Code,
         n: NodeId,
     ) -> Result<Option<f64>, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         let Op::Observe { value, coarse: Some(coarse), .. } = self.op(code, n) else {
             return Ok(None);
         };
@@ -153,7 +104,7 @@ impl Graph {
         n: NodeId,
         weight: Operand,
     ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        let frame = self.store[n].frame;
         if let Some(m) = self.unready(frame, weight) {
             return self.need(code, m);
         }
@@ -176,54 +127,18 @@ impl Graph {
                 return Err(self.type_error(code, n, message));
             }
         };
-        if self.nodes[n as usize].flags & WAS_STALE != 0 {
+        if self.store[n].flags & WAS_STALE != 0 {
             self.retire_score(n);
         }
-        self.likelihood.add(score);
-        self.nodes[n as usize].score = score;
+        self.score.likelihood.add(score);
+        self.store[n].score = score;
         Ok(self.finish(code, n, Value::Unit))
     }
 
     /// Removes an observation's or factor's score from the likelihood.
     pub(crate) fn retire_score(&mut self, n: NodeId) {
-        let mut likelihood = std::mem::take(&mut self.likelihood);
+        let mut likelihood = std::mem::take(&mut self.score.likelihood);
         self.take_score(n, &mut likelihood);
-        self.likelihood = likelihood;
-    }
-
-    /// Adds an observation's or factor's score to a sum.
-    pub(crate) fn put_score(&self, n: NodeId, to: &mut ExactSum) {
-        let node = &self.nodes[n as usize];
-        match node.side.as_deref() {
-            Some(Side::Total(t)) if node.score == 0.0 => to.merge(&t.sum),
-            _ => to.add(node.score),
-        }
-    }
-
-    /// Adds the score of a choice to one sum, that of an observation or factor to the other.
-    pub(crate) fn put_scored(
-        &self,
-        code: &Code,
-        n: NodeId,
-        prior: &mut ExactSum,
-        likelihood: &mut ExactSum,
-    ) {
-        let node = &self.nodes[n as usize];
-        match (self.op(code, n), node.side.as_deref()) {
-            (Op::Draw { .. }, Some(Side::Choice(c))) if c.elements != NONE => {
-                c.scores.iter().for_each(|s| prior.add(*s));
-            }
-            (Op::Draw { .. }, _) => prior.add(node.score),
-            _ => self.put_score(n, likelihood),
-        }
-    }
-
-    /// Subtracts an observation's or factor's score from a sum.
-    pub(crate) fn take_score(&self, n: NodeId, from: &mut ExactSum) {
-        let node = &self.nodes[n as usize];
-        match node.side.as_deref() {
-            Some(Side::Total(t)) if node.score == 0.0 => from.unmerge(&t.sum),
-            _ => from.sub(node.score),
-        }
+        self.score.likelihood = likelihood;
     }
 }

@@ -20,8 +20,8 @@ pub use recording::Recording;
 pub(in crate::trace) use recording::SummedChoices;
 
 use super::choices::Target;
-use super::graph::Graph;
 use super::node::*;
+use super::store::Store;
 use super::update::Failure;
 use crate::lang::adjoint::Adjoint;
 use crate::lang::code::{Code, DistSpec, Operand};
@@ -46,7 +46,7 @@ enum Mark {
 
 /// A reverse pass.
 pub(super) struct Reverse<'a> {
-    graph: &'a Graph,
+    graph: &'a Store,
     code: &'a Code,
     marks: Vec<Mark>,
     /// The active nodes, operands first.
@@ -58,7 +58,7 @@ pub(super) struct Reverse<'a> {
     power: f64,
 }
 
-impl Graph {
+impl Store {
     /// Appends to `out` the gradient, with respect to the unconstrained coordinates of
     /// the targets one after the other, of the log prior plus `power` times the log
     /// likelihood plus the log Jacobians of the transforms, with a weight for each score.
@@ -75,9 +75,9 @@ impl Graph {
         (power, weight): (f64, &dyn Fn(NodeId) -> f64),
         out: &mut Vec<f64>,
     ) -> Result<(), Failure> {
-        let mut marks = vec![Mark::Unseen; self.nodes.len()];
+        let mut marks = vec![Mark::Unseen; self.len()];
         for t in targets {
-            marks[t.node as usize] = Mark::Target;
+            marks[t.node] = Mark::Target;
         }
         let mut pass = Reverse {
             graph: self,
@@ -93,7 +93,7 @@ impl Graph {
         }
         let mut active_scores = Vec::new();
         for n in scored {
-            let mut reached = pass.marks[*n as usize] == Mark::Active;
+            let mut reached = pass.marks[*n] == Mark::Active;
             for input in pass.score_inputs(*n) {
                 reached |= pass.visit(input);
             }
@@ -112,10 +112,8 @@ impl Graph {
             let by = pass.adjoints.remove(&n).unwrap_or_default();
             // A likelihood may have no derivative for some of its arguments; that matters
             // only if these depend on a target.
-            let in_parts = matches!(
-                (&self.nodes[n as usize].value, &by),
-                (Value::Likelihood(_), Adjoint::List(_))
-            );
+            let in_parts =
+                matches!((&self[n].value, &by), (Value::Likelihood(_), Adjoint::List(_)));
             if by.is_unknown() && !in_parts {
                 return Err(pass.no_derivative(n, "a value computed from this"));
             }
@@ -200,13 +198,13 @@ impl<'a> Reverse<'a> {
             let Some(input) = inputs.get(*next).copied() else {
                 let (n, active) = (*n, *active);
                 stack.pop();
-                self.marks[n as usize] = if active { Mark::Active } else { Mark::Fixed };
+                self.marks[n] = if active { Mark::Active } else { Mark::Fixed };
                 if active {
                     self.order.push(n);
                 }
                 continue;
             };
-            match self.marks[input as usize] {
+            match self.marks[input] {
                 Mark::Unseen | Mark::Target => self.open(input, &mut stack),
                 mark => {
                     *active |= mark == Mark::Active;
@@ -214,20 +212,20 @@ impl<'a> Reverse<'a> {
                 }
             }
         }
-        self.marks[root as usize] == Mark::Active
+        self.marks[root] == Mark::Active
     }
 
     fn open(&mut self, n: NodeId, stack: &mut Vec<(NodeId, Inputs, usize, bool)>) {
-        let target = match self.marks[n as usize] {
+        let target = match self.marks[n] {
             Mark::Unseen => false,
             Mark::Target => true,
             _ => return,
         };
         let inputs = self.inputs(n, target);
         if inputs.is_empty() && !target {
-            self.marks[n as usize] = Mark::Fixed;
+            self.marks[n] = Mark::Fixed;
         } else {
-            self.marks[n as usize] = Mark::Open;
+            self.marks[n] = Mark::Open;
             stack.push((n, inputs, 0, target));
         }
     }
@@ -235,8 +233,8 @@ impl<'a> Reverse<'a> {
     /// Returns the node that holds an operand's value; a container is read as a whole.
     fn source(&self, frame: FrameId, o: Operand) -> Option<NodeId> {
         let n = self.graph.resolve(frame, o)?;
-        Some(match &self.graph.nodes[n as usize].value {
-            Value::Container(r) => r.node + 1,
+        Some(match &self.graph[n].value {
+            Value::Container(r) => r.node.gather(),
             _ => n,
         })
     }
@@ -248,7 +246,7 @@ impl<'a> Reverse<'a> {
     }
 
     fn is_active(&self, n: NodeId) -> bool {
-        self.marks[n as usize] == Mark::Active
+        self.marks[n] == Mark::Active
     }
 
     /// Adds to the adjoint of an operand.
@@ -265,7 +263,7 @@ impl<'a> Reverse<'a> {
     }
 
     fn dist_inputs(&self, n: NodeId, dist: &DistSpec, inputs: &mut Inputs) {
-        let frame = self.graph.nodes[n as usize].frame;
+        let frame = self.graph[n].frame;
         inputs.extend(dist.operands().iter().filter_map(|o| self.source(frame, *o)));
     }
 

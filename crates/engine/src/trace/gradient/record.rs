@@ -26,11 +26,12 @@ impl Graph {
         for (i, t) in targets.iter().enumerate() {
             // Elements of one choice are adjacent.
             if i == 0 || targets[i - 1].node != t.node {
-                self.invalidate_target(code, t.node);
+                self.update.invalidate_target(&mut self.store, code, t.node);
             }
         }
         let mut all: Vec<NodeId> = self
-            .journal
+            .update
+            .journal()
             .iter()
             .filter_map(|e| if let Entry::Node { id, .. } = e { Some(*id) } else { None })
             .collect();
@@ -275,7 +276,7 @@ impl Recorder<'_> {
     }
 
     fn value(&self, n: NodeId) -> &Value {
-        &self.view.graph.nodes[n as usize].value
+        &self.view.graph[n].value
     }
 
     fn form(&self, n: NodeId) -> Form {
@@ -305,9 +306,9 @@ impl Recorder<'_> {
     /// Records the operation of a node; `None` if that is not possible.
     fn record_op(&mut self, n: NodeId) -> Option<Form> {
         let (graph, code) = (self.view.graph, self.view.code);
-        let frame = graph.nodes[n as usize].frame;
-        let side = graph.nodes[n as usize].side.as_deref();
-        let now = graph.nodes[n as usize].value.clone();
+        let frame = graph[n].frame;
+        let side = graph[n].side.as_deref();
+        let now = graph[n].value.clone();
         match graph.op(code, n) {
             Op::Prim { builtin, args } => {
                 let args = self.operands(frame, args);
@@ -448,7 +449,7 @@ impl Recorder<'_> {
 
     /// A call of a function of the program, whose frame is fixed.
     fn record_call(&mut self, n: NodeId) -> Option<Form> {
-        match self.view.graph.nodes[n as usize].side.as_deref() {
+        match self.view.graph[n].side.as_deref() {
             Some(Side::MemoCall(c)) if c.deps.iter().any(|d| !self.form(*d).is_fixed()) => None,
             _ => self.handed_on(n),
         }
@@ -464,7 +465,7 @@ impl Recorder<'_> {
 
     fn record_draw(&mut self, n: NodeId, spec: &DistSpec, keys: &[Operand]) -> Option<Form> {
         let (graph, code) = (self.view.graph, self.view.code);
-        let frame = graph.nodes[n as usize].frame;
+        let frame = graph[n].frame;
         let dist = graph.dist_of(code, n)?;
         if dist.is_stored_whitened() != graph.is_whitened(n)
             || !self.operands(frame, keys).iter().all(Form::is_fixed)
@@ -510,7 +511,7 @@ impl Recorder<'_> {
 
     fn record_score(&mut self, n: NodeId, spec: &DistSpec, x: &Form, observed: bool) -> Option<()> {
         let (graph, code) = (self.view.graph, self.view.code);
-        let frame = graph.nodes[n as usize].frame;
+        let frame = graph[n].frame;
         let mark = self.recorded.tape.mark();
         match spec {
             DistSpec::Family { builtin, args } => {

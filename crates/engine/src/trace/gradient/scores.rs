@@ -18,7 +18,7 @@ impl Reverse<'_> {
     /// from, except the choice itself.
     pub(super) fn score_inputs(&self, n: NodeId) -> Inputs {
         let mut all = Inputs::new();
-        let frame = self.graph.nodes[n as usize].frame;
+        let frame = self.graph[n].frame;
         match self.graph.op(self.code, n) {
             // The density of white noise does not depend on the choice's parameters.
             Op::Draw { .. } if self.graph.is_whitened(n) => {}
@@ -38,7 +38,7 @@ impl Reverse<'_> {
     /// Adds the derivatives of one score to the adjoints of its inputs.
     pub(super) fn vjp_score(&mut self, n: NodeId) -> Result<(), Failure> {
         let (g, code) = (self.graph, self.code);
-        let frame = g.nodes[n as usize].frame;
+        let frame = g[n].frame;
         match g.op(code, n) {
             Op::Factor { weight, .. } => self.give(frame, *weight, Adjoint::Num(self.power)),
             Op::Draw { dist: spec, .. } => {
@@ -118,7 +118,7 @@ impl Reverse<'_> {
         dist: &Dist,
         params: Vec<f64>,
     ) -> Result<(), Failure> {
-        let frame = self.graph.nodes[n as usize].frame;
+        let frame = self.graph[n].frame;
         match spec {
             DistSpec::Value(o) => self.give(frame, *o, Adjoint::Array(params)),
             DistSpec::Family { builtin, args } => {
@@ -148,7 +148,7 @@ impl Reverse<'_> {
         by_value: &[f64],
         weight: f64,
     ) -> Result<(), Failure> {
-        let frame = self.graph.nodes[n as usize].frame;
+        let frame = self.graph[n].frame;
         let values = self.values(frame, spec.operands());
         let i = match spec {
             DistSpec::Value(_) => density::matrix(dist, &[]).map(|_| 0),

@@ -17,8 +17,8 @@ impl Reverse<'_> {
     /// move its support.
     pub(super) fn inputs(&self, n: NodeId, target: bool) -> Inputs {
         let (g, mut all) = (self.graph, Inputs::new());
-        let frame = g.nodes[n as usize].frame;
-        let side = g.nodes[n as usize].side.as_deref();
+        let frame = g[n].frame;
+        let side = g[n].side.as_deref();
         match g.op(self.code, n) {
             Op::Prim { args, .. } | Op::Array(args) => {
                 all.extend(args.iter().filter_map(|o| self.source(frame, *o)));
@@ -43,9 +43,11 @@ impl Reverse<'_> {
                 }
             }
             Op::Call { .. } | Op::If { .. } | Op::Fold { .. } => match side {
-                Some(Side::Child(c)) if c.result != NONE => all.push(self.whole(c.result)),
-                Some(Side::MemoCall(c)) if c.result != NONE => all.push(self.whole(c.result)),
-                Some(Side::Loop(l)) if l.result != NONE => all.push(self.whole(l.result)),
+                Some(Side::Child(c)) if c.result != NodeId::NONE => all.push(self.whole(c.result)),
+                Some(Side::MemoCall(c)) if c.result != NodeId::NONE => {
+                    all.push(self.whole(c.result))
+                }
+                Some(Side::Loop(l)) if l.result != NodeId::NONE => all.push(self.whole(l.result)),
                 // A built-in function value was called.
                 Some(Side::Deps(deps) | Side::Kept(Kept { deps, .. })) => {
                     all.extend(deps.iter().map(|d| self.whole(*d)))
@@ -69,8 +71,8 @@ impl Reverse<'_> {
     }
 
     fn whole(&self, n: NodeId) -> NodeId {
-        match &self.graph.nodes[n as usize].value {
-            Value::Container(r) => r.node + 1,
+        match &self.graph[n].value {
+            Value::Container(r) => r.node.gather(),
             _ => n,
         }
     }
@@ -78,7 +80,7 @@ impl Reverse<'_> {
     /// Propagates an adjoint to the inputs of a node.
     pub(super) fn vjp(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
         let g = self.graph;
-        let frame = g.nodes[n as usize].frame;
+        let frame = g[n].frame;
         match g.op(self.code, n) {
             Op::Prim { builtin, args } => {
                 let builtin = self.code.builtins.get(*builtin);
@@ -97,7 +99,7 @@ impl Reverse<'_> {
             Op::Index { .. } => {
                 if let Some((source, keys)) = self.indexed(n) {
                     let mut whole = Adjoint::Zero;
-                    whole.add_at(&g.nodes[source as usize].value, &keys, by.clone());
+                    whole.add_at(&g[source].value, &keys, by.clone());
                     self.give_node(source, whole);
                 }
             }
@@ -139,12 +141,12 @@ impl Reverse<'_> {
     /// Returns the alternative that a selection takes.
     pub(super) fn taken(&self, n: NodeId) -> Option<Operand> {
         let Op::Select { then, otherwise, .. } = self.graph.op(self.code, n) else { return None };
-        Some(if self.graph.nodes[n as usize].flags & OTHERWISE == 0 { *then } else { *otherwise })
+        Some(if self.graph[n].flags & OTHERWISE == 0 { *then } else { *otherwise })
     }
 
     fn give_part(&mut self, source: NodeId, i: usize, by: &Adjoint) {
         let mut whole = Adjoint::Zero;
-        whole.add_position(&self.graph.nodes[source as usize].value, i, by.clone());
+        whole.add_position(&self.graph[source].value, i, by.clone());
         self.give_node(source, whole);
     }
 
@@ -152,15 +154,15 @@ impl Reverse<'_> {
     /// element, or `None` if the parameter gets the whole value.
     pub(super) fn passed(&self, n: NodeId) -> Option<(NodeId, Option<usize>)> {
         let g = self.graph;
-        let f = &g.frames[g.nodes[n as usize].frame as usize];
-        let slot = n - f.base;
+        let f = &g[g[n].frame];
+        let slot = (n - f.base).0;
         let element = match (&f.args, g.op(self.code, n)) {
             (_, Op::Item) | (Arguments::Item, _) => {
                 slot == 0 || matches!(g.op(self.code, n), Op::Item)
             }
             (Arguments::Fold, _) if slot == 1 => true,
             (Arguments::Fold, _) if slot == 0 => {
-                return match g.nodes[n as usize].side.as_deref() {
+                return match g[n].side.as_deref() {
                     Some(Side::Deps(deps)) => deps.first().map(|d| (self.whole(*d), None)),
                     _ => None,
                 };
@@ -170,7 +172,7 @@ impl Reverse<'_> {
         if !element {
             return None;
         }
-        let home = g.nodes[f.owner as usize].frame;
+        let home = g[f.owner].frame;
         let over = match g.op(self.code, f.owner) {
             Op::For { iter, .. } => *iter,
             Op::Map { over, .. } | Op::Fold { over, .. } => *over,
@@ -183,21 +185,21 @@ impl Reverse<'_> {
     /// from, and those keys.
     pub(super) fn indexed(&self, n: NodeId) -> Option<(NodeId, SmallVec<[Value; 2]>)> {
         let g = self.graph;
-        let frame = g.nodes[n as usize].frame;
+        let frame = g[n].frame;
         let Op::Index { base, keys } = g.op(self.code, n) else { return None };
         let mut gathered = Deps::new();
         let mut rest: SmallVec<[Value; 2]> =
             keys.iter().map(|k| g.plain(self.code, frame, *k, &mut gathered).clone()).collect();
-        let found: &[NodeId] = match g.nodes[n as usize].side.as_deref() {
+        let found: &[NodeId] = match g[n].side.as_deref() {
             Some(Side::Deps(deps)) => &deps[gathered.len().min(deps.len())..],
             _ => &[],
         };
         let mut found = found.iter();
         let mut source = g.resolve(frame, *base)?;
         while !rest.is_empty() {
-            let Value::Container(r) = &g.nodes[source as usize].value else { break };
+            let Value::Container(r) = &g[source].value else { break };
             let next = *found.next()?;
-            if next != r.node + 1 {
+            if next != r.node.gather() {
                 let width = g.key_width(self.code, r.node).min(rest.len());
                 rest.drain(..width);
             }
@@ -207,14 +209,14 @@ impl Reverse<'_> {
     }
 
     fn vjp_gather(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
-        if !matches!(self.graph.nodes[n as usize].side.as_deref(), Some(Side::Deps(_))) {
+        if !matches!(self.graph[n].side.as_deref(), Some(Side::Deps(_))) {
             return Ok(());
         }
         let Some(elements) = self.gathered(n) else {
             return Err(self.no_derivative(n, "the result of this map"));
         };
         for (i, d) in elements.into_iter().enumerate() {
-            let part = match &self.graph.nodes[n as usize].value {
+            let part = match &self.graph[n].value {
                 Value::Record(r) => {
                     r.get_index(i).map_or(Adjoint::Zero, |(name, _)| by.field(name))
                 }
@@ -229,13 +231,10 @@ impl Reverse<'_> {
     /// if some elements are constants.
     pub(super) fn gathered(&self, n: NodeId) -> Option<Inputs> {
         let g = self.graph;
-        let Some(Side::Deps(deps)) = g.nodes[n as usize].side.as_deref() else { return None };
-        let nested = deps
-            .iter()
-            .filter(|d| matches!(g.nodes[**d as usize].value, Value::Container(_)))
-            .count();
+        let Some(Side::Deps(deps)) = g[n].side.as_deref() else { return None };
+        let nested = deps.iter().filter(|d| matches!(g[**d].value, Value::Container(_))).count();
         let elements = &deps[..deps.len() - nested];
-        let count = match &g.nodes[n as usize].value {
+        let count = match &g[n].value {
             Value::Record(r) => r.len(),
             v => v.len().unwrap_or(0),
         };

@@ -235,11 +235,11 @@ impl Trace {
     ) -> TraceResult<Result<Weight, Label>> {
         self.rollback();
         let before = self.graph.begin();
-        self.graph.draws = draws;
-        self.graph.queue(&self.code, changes);
+        self.graph.update.draws = draws;
+        self.graph.update.queue(&mut self.graph.store, &self.code, changes);
         match self.graph.propagate(&self.code) {
             Err(e) if e.is_recoverable() => {
-                let failed = std::mem::take(&mut self.graph.failed);
+                let failed = std::mem::take(&mut self.graph.update.failed);
                 let new = failed.last().filter(|n| self.is_improper_draw(**n)).copied();
                 let label = Reader::new(&self.graph, &self.code, own, &mut m.partition)
                     .read_failed(&failed);
@@ -281,12 +281,11 @@ impl Trace {
     pub(super) fn detaches_held(&self) -> bool {
         let g = &self.graph;
         let stays = |f: &FrameId| {
-            let frame = &g.frames[*f as usize];
-            let mut nodes =
-                frame.base..frame.base + self.code.blocks[frame.block as usize].len() as u32;
-            nodes.any(|n| g.nodes[n as usize].refs > 0)
+            let frame = &g.store[*f];
+            let mut slots = self.code.blocks[frame.block].slots();
+            slots.any(|s| g.store[frame.base + s].refs > 0)
         };
-        g.detached.iter().any(stays)
+        g.update.detached.iter().any(stays)
     }
 }
 

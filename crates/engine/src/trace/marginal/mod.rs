@@ -122,7 +122,7 @@ impl Trace {
     }
 
     /// Returns the group that a score belongs to.
-    pub fn group_of(&self, elimination: &Elimination, score: u32) -> Option<usize> {
+    pub fn group_of(&self, elimination: &Elimination, score: NodeId) -> Option<usize> {
         if let Some(group) = elimination.reached.get(&score) {
             return Some(*group);
         }
@@ -133,9 +133,9 @@ impl Trace {
         }
         let mut n = score;
         let mut found = None;
-        while n != NONE {
+        while n != NodeId::NONE {
             found = elimination.owners.get(&n).copied().or(found);
-            n = self.graph.frames[self.graph.nodes[n as usize].frame as usize].owner;
+            n = self.graph.store[self.graph.store[n].frame].owner;
         }
         found
     }
@@ -160,7 +160,8 @@ impl Trace {
         let tempered = |prior: &ExactSum, likelihood: &ExactSum| {
             prior.value() + if power == 0.0 { 0.0 } else { power * likelihood.value() }
         };
-        let (mut prior, mut likelihood) = (self.graph.prior.clone(), self.graph.likelihood.clone());
+        let (mut prior, mut likelihood) =
+            (self.graph.score.prior.clone(), self.graph.score.likelihood.clone());
         terms.clear();
         for group in &elimination.groups {
             let (mut own_prior, mut own_likelihood) = (ExactSum::default(), ExactSum::default());
@@ -180,19 +181,19 @@ impl Trace {
         let mut open = vec![owner];
         while let Some(n) = open.pop() {
             let mut frame = |f: FrameId| {
-                let frame = &self.graph.frames[f as usize];
-                let effects = &self.code.blocks[frame.block as usize].effects;
-                for m in effects.iter().map(|s| frame.base + s).filter(|m| self.is_clean(*m)) {
+                let frame = &self.graph.store[f];
+                let effects = &self.code.blocks[frame.block].effects;
+                for m in effects.iter().map(|s| frame.base + *s).filter(|m| self.is_clean(*m)) {
                     match self.graph.op(&self.code, m) {
                         Op::Observe { .. } | Op::Factor { .. } => self.graph.put_score(m, to),
                         _ => open.push(m),
                     }
                 }
             };
-            match self.graph.nodes[n as usize].side.as_deref() {
+            match self.graph.store[n].side.as_deref() {
                 Some(Side::Child(c)) => frame(c.frame),
                 Some(Side::Loop(l)) => {
-                    l.frames.iter().filter(|f| **f != NONE).for_each(|f| frame(*f))
+                    l.frames.iter().filter(|f| **f != FrameId::NONE).for_each(|f| frame(*f))
                 }
                 Some(Side::Memo(m)) => m.entries.values().for_each(|(f, _)| frame(*f)),
                 _ => {}
@@ -201,7 +202,7 @@ impl Trace {
     }
 
     fn is_clean(&self, n: NodeId) -> bool {
-        self.graph.nodes[n as usize].state == State::Clean
+        self.graph.store[n].state == State::Clean
     }
 
     fn cannot_sum(&self, t: Target, why: &str) -> Box<RunError> {

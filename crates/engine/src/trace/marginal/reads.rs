@@ -9,8 +9,8 @@
 use super::partition::Partition;
 use crate::lang::code::{Callee, Code, Op, Operand};
 use crate::trace::gradient::Given;
-use crate::trace::graph::Graph;
 use crate::trace::node::*;
+use crate::trace::store::Store;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 
@@ -132,7 +132,7 @@ impl Found {
 }
 
 pub(super) struct Reader<'a> {
-    graph: &'a Graph,
+    graph: &'a Store,
     code: &'a Code,
     /// Choices that are summed out, and those that move.
     own: &'a FxHashMap<NodeId, Label>,
@@ -145,12 +145,12 @@ pub(super) struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     pub fn new(
-        graph: &'a Graph,
+        graph: &'a Store,
         code: &'a Code,
         own: &'a FxHashMap<NodeId, Label>,
         partition: &'a mut Partition,
     ) -> Self {
-        let n = graph.nodes.len();
+        let n = graph.len();
         let (seen, labels) = (vec![Visit::Not; n], vec![NOTHING; n]);
         let found = Found::default();
         Reader { graph, code, own, partition, seen, labels, found, sets: None }
@@ -160,8 +160,7 @@ impl<'a> Reader<'a> {
     /// each node, if sets are kept; `None` for nodes whose existence depends on some, or that
     /// depend on too many to tell.
     pub fn given(&mut self, indices: &[usize]) -> FxHashMap<NodeId, Option<Given>> {
-        let exists = |n: &NodeId| self.graph.nodes[*n as usize].state == State::Clean;
-        let all: Vec<NodeId> = (0..self.graph.nodes.len() as NodeId).filter(exists).collect();
+        let all: Vec<NodeId> = self.graph.clean().collect();
         let at = |x: &u32| (*x, indices[*x as usize] as u32);
         all.into_iter().map(|n| (n, self.reads(n).map(|x| x.iter().map(at).collect()))).collect()
     }
@@ -175,12 +174,8 @@ impl<'a> Reader<'a> {
     /// Follows every score, and merges the groups of choices that one score reads.
     /// `choices` are those of the trace.
     pub fn read_all(&mut self, choices: impl Iterator<Item = NodeId>) {
-        for n in 0..self.graph.nodes.len() as NodeId {
-            if self.graph.nodes[n as usize].state == State::Clean
-                && self.graph.slot_facts(self.code, n).is_effect
-            {
-                self.read_effect(n);
-            }
+        for n in self.graph.clean().filter(|n| self.graph.slot_facts(self.code, *n).is_effect) {
+            self.read_effect(n);
         }
         let asked = self.found.asked.len();
         // Held choices have scores too, even if nothing depends on them.
@@ -211,7 +206,7 @@ impl<'a> Reader<'a> {
             let (placed, _) = self.placed(*n);
             label = self.join(label, placed);
             for d in self.inputs(*n) {
-                if self.graph.nodes[d as usize].state == State::Clean {
+                if self.graph[d].state == State::Clean {
                     let read = self.visit(d);
                     label = self.join(label, read);
                 }
@@ -249,21 +244,21 @@ impl<'a> Reader<'a> {
 
     /// Returns what a node's value depends on.
     fn visit(&mut self, root: NodeId) -> Label {
-        if self.seen[root as usize] != Visit::Not {
-            return self.labels[root as usize];
+        if self.seen[root] != Visit::Not {
+            return self.labels[root];
         }
         let mut stack: Vec<(NodeId, Inputs, usize, Label)> =
             vec![(root, self.inputs(root), 0, NOTHING)];
-        self.seen[root as usize] = Visit::Open;
+        self.seen[root] = Visit::Open;
         while let Some((n, inputs, next, label)) = stack.last_mut() {
             if let Some(input) = inputs.get(*next).copied() {
-                if self.seen[input as usize] == Visit::Not {
-                    self.seen[input as usize] = Visit::Open;
+                if self.seen[input] == Visit::Not {
+                    self.seen[input] = Visit::Open;
                     let inner = self.inputs(input);
                     stack.push((input, inner, 0, NOTHING));
                 } else {
                     *next += 1;
-                    let (own, read) = (*label, self.labels[input as usize]);
+                    let (own, read) = (*label, self.labels[input]);
                     let joined = self.join(own, read);
                     if let Some((_, _, _, label)) = stack.last_mut() {
                         *label = joined;
@@ -273,10 +268,10 @@ impl<'a> Reader<'a> {
             }
             let (n, read) = (*n, *label);
             stack.pop();
-            self.labels[n as usize] = self.ended(n, read);
-            self.seen[n as usize] = Visit::Done;
+            self.labels[n] = self.ended(n, read);
+            self.seen[n] = Visit::Done;
         }
-        self.labels[root as usize]
+        self.labels[root]
     }
 
     /// Returns what the value of a node depends on, given what its inputs depend on.
@@ -311,16 +306,16 @@ impl<'a> Reader<'a> {
     fn inputs(&self, n: NodeId) -> Inputs {
         let (g, mut all) = (self.graph, Inputs::new());
         g.each_dep(self.code, n, |d, _| all.push(d));
-        let frame = &g.frames[g.nodes[n as usize].frame as usize];
+        let frame = &g[g[n].frame];
         let of_a_pass = match g.op(self.code, n) {
             Op::Item => true,
             Op::Param { .. } => matches!(frame.args, Arguments::Item | Arguments::Fold),
             _ => false,
         };
-        if of_a_pass && frame.owner != NONE {
-            let home = g.nodes[frame.owner as usize].frame;
+        if of_a_pass && frame.owner != NodeId::NONE {
+            let home = g[frame.owner].frame;
             g.op(self.code, frame.owner).operands(|o| all.extend(g.resolve(home, o)));
-            if let Some(Side::Loop(l)) = g.nodes[frame.owner as usize].side.as_deref() {
+            if let Some(Side::Loop(l)) = g[frame.owner].side.as_deref() {
                 all.extend(l.deps.iter().copied());
             }
         }
@@ -344,8 +339,8 @@ impl<'a> Reader<'a> {
     /// have other nodes each time.
     fn placed(&mut self, n: NodeId) -> (Label, Option<NodeId>) {
         let (mut label, mut outermost, mut in_memo) = (NOTHING, None, false);
-        let mut owner = self.graph.frames[self.graph.nodes[n as usize].frame as usize].owner;
-        while owner != NONE {
+        let mut owner = self.graph[self.graph[n].frame].owner;
+        while owner != NodeId::NONE {
             let mut decided = self.decided(owner);
             if matches!(self.graph.op(self.code, owner), Op::Mem { .. }) {
                 // Its entries exist for calls that may be anywhere, so every choice may
@@ -359,7 +354,7 @@ impl<'a> Reader<'a> {
             }
             in_memo |= matches!(self.graph.op(self.code, owner), Op::Mem { .. });
             label = self.join(label, decided);
-            owner = self.graph.frames[self.graph.nodes[owner as usize].frame as usize].owner;
+            owner = self.graph[self.graph[owner].frame].owner;
         }
         self.found.structure_moves |= label.moves;
         self.found.structure_varies |= label.site != NONE;
@@ -367,11 +362,11 @@ impl<'a> Reader<'a> {
     }
 }
 
-impl Graph {
+impl Store {
     /// Calls `f` with the nodes whose values decide which other nodes a node reads, and
     /// which frames it has.
     pub(in crate::trace) fn deciders(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId)) {
-        let node = &self.nodes[n as usize];
+        let node = &self[n];
         let mut operand = |o: &Operand| {
             if let Some(d) = self.resolve(node.frame, *o) {
                 f(d);

@@ -178,10 +178,9 @@ impl Trace {
         choices: &[NodeId],
     ) -> Vec<(Option<NodeId>, NodeId)> {
         let is_score = |n: &NodeId| {
-            self.graph.nodes[*n as usize].state == State::Clean
-                && matches!(self.graph.op(&self.code, *n), Op::Observe { .. } | Op::Factor { .. })
+            matches!(self.graph.op(&self.code, *n), Op::Observe { .. } | Op::Factor { .. })
         };
-        let mut all: Vec<NodeId> = (0..self.graph.nodes.len() as NodeId).filter(is_score).collect();
+        let mut all: Vec<NodeId> = self.graph.clean().filter(is_score).collect();
         all.extend(choices);
         all.sort_unstable();
         all.dedup();
@@ -190,9 +189,9 @@ impl Trace {
                 return scopes.contains_key(&n).then_some(n);
             }
             let (mut at, mut outermost) = (n, None);
-            while at != NONE {
+            while at != NodeId::NONE {
                 outermost = Some(at).filter(|at| scopes.contains_key(at)).or(outermost);
-                at = self.graph.frames[self.graph.nodes[at as usize].frame as usize].owner;
+                at = self.graph.store[self.graph.store[at].frame].owner;
             }
             outermost
         };

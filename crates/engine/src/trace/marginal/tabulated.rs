@@ -94,7 +94,7 @@ impl Trace {
                 trace.asks_for_all(sites, &state)?;
                 tables.enter(trace, sites, state, power)
             };
-            let most = (MOST_WORK / self.graph.nodes.len().max(1)).clamp(1, MOST);
+            let most = (MOST_WORK / self.graph.store.len().max(1)).clamp(1, MOST);
             match self.visit_states(&mut sites, (most, false), draws, visit) {
                 Ok(()) => break self.tabulated(&sites, tables),
                 Err(Halt::Fails) => break Tabulation::Fails,

@@ -17,6 +17,7 @@ use crate::trace::graph::Graph;
 use crate::trace::node::*;
 use crate::trace::propose::Weight;
 use crate::trace::shortcuts::register::{Register, element, family};
+use crate::trace::store::Store;
 use crate::trace::{Target, Trace};
 use pcadlang_numerics::dist::{Datum, Dist};
 use pcadlang_numerics::num::ExactSum;
@@ -45,7 +46,7 @@ const LARGEST: usize = 1024;
 
 /// The evaluation of a local density on the nodes of one frame.
 pub(crate) struct Evaluation<'a, const N: usize> {
-    graph: &'a Graph,
+    graph: &'a Store,
     code: &'a Code,
     base: NodeId,
     registers: [Register<'a>; N],
@@ -94,17 +95,6 @@ impl Trace {
 }
 
 impl Graph {
-    /// Whether a choice is a single number or boolean, stored as the program sees it.
-    pub fn is_plain_choice(&self, n: NodeId) -> bool {
-        let node = &self.nodes[n as usize];
-        let whole = match node.side.as_deref() {
-            None => true,
-            Some(Side::Choice(c)) => c.stored.is_none() && c.elements == NONE && c.deps.is_empty(),
-            _ => false,
-        };
-        whole && matches!(node.value, Value::Num(_) | Value::Bool(_))
-    }
-
     /// Returns the local densities that together give the effect of another value of a
     /// choice; `None` if there are none in this state.
     pub fn local_densities<'c>(
@@ -113,7 +103,7 @@ impl Graph {
         target: NodeId,
     ) -> Option<LocalDensities<'c>> {
         let facts = self.slot_facts(code, target);
-        let finite = self.prior.is_fine() && self.likelihood.is_fine();
+        let finite = self.score.prior.is_fine() && self.score.likelihood.is_fine();
         if !self.incremental
             || !finite
             || self.execution_log.is_some()
@@ -128,12 +118,12 @@ impl Graph {
             facts.local_density.as_deref()?,
             &mut all,
         )?;
-        let readers = &self.outside[self.nodes[target as usize].outside as usize].users;
+        let readers = &self.outside(target).users;
         if readers.len() > READERS {
             return None;
         }
         for (i, m) in readers.iter().enumerate() {
-            let node = &self.nodes[*m as usize];
+            let node = &self.store[*m];
             if node.state != State::Clean || readers[..i].contains(m) {
                 continue;
             }
@@ -147,7 +137,7 @@ impl Graph {
             if self.is_read_outside(*m) {
                 return None;
             }
-            self.add_local_density(*m, m - facts.slot, facts.local_density.as_deref()?, &mut all)?;
+            self.add_local_density(*m, *m - facts.slot, facts.local_density.as_deref()?, &mut all)?;
         }
         Some(all)
     }
@@ -160,7 +150,7 @@ impl Graph {
         local_density: &'c LocalDensity,
         all: &mut LocalDensities<'c>,
     ) -> Option<()> {
-        if local_density.computations.iter().any(|slot| self.is_read_outside(base + slot)) {
+        if local_density.computations.iter().any(|slot| self.is_read_outside(base + *slot)) {
             return None;
         }
         // Two local densities in one frame could change the same score.
@@ -176,6 +166,19 @@ impl Graph {
     /// Returns an evaluation of local densities, for [`Evaluation::weigh`].
     pub fn evaluation<'a>(&'a self, code: &'a Code) -> Evaluation<'a, REGISTERS> {
         Evaluation::new(self, code, [Register::Num(0.0); REGISTERS])
+    }
+}
+
+impl Store {
+    /// Whether a choice is a single number or boolean, stored as the program sees it.
+    pub fn is_plain_choice(&self, n: NodeId) -> bool {
+        let node = &self[n];
+        let whole = match node.side.as_deref() {
+            None => true,
+            Some(Side::Choice(c)) => c.stored.is_none() && c.elements == NONE && c.deps.is_empty(),
+            _ => false,
+        };
+        whole && matches!(node.value, Value::Num(_) | Value::Bool(_))
     }
 
     /// Returns the distribution of a choice whose parameters are single numbers or
@@ -207,7 +210,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
         power: f64,
     ) -> Option<f64> {
         self.begin(Register::of_datum(value)?);
-        self.prior.sub(self.graph.nodes[target as usize].score);
+        self.prior.sub(self.graph[target].score);
         self.prior.add(dist.log_density_stored(value));
         local_densities
             .iter()
@@ -430,7 +433,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
         };
         let is_kept = |h: &KeptAlternative| {
             let Some(n) = self.graph.resolve(self.frame(), h.operand) else { return true };
-            let node = &self.graph.nodes[n as usize];
+            let node = &self.graph[n];
             if node.refs > h.times || !is_taken(h) {
                 return true;
             }
@@ -493,11 +496,11 @@ impl<'a> Evaluation<'a, REGISTERS> {
 }
 
 impl<'a, const N: usize> Evaluation<'a, N> {
-    fn new(graph: &'a Graph, code: &'a Code, registers: [Register<'a>; N]) -> Self {
+    fn new(graph: &'a Store, code: &'a Code, registers: [Register<'a>; N]) -> Self {
         Evaluation {
             graph,
             code,
-            base: 0,
+            base: NodeId::default(),
             registers,
             filled: 0,
             made: SmallVec::new(),
@@ -511,11 +514,11 @@ impl<'a, const N: usize> Evaluation<'a, N> {
 
     #[inline(always)]
     fn node(&self, slot: Slot) -> &'a Node {
-        &self.graph.nodes[(self.base + slot) as usize]
+        &self.graph[self.base + slot]
     }
 
     fn frame(&self) -> FrameId {
-        self.graph.nodes[self.base as usize].frame
+        self.graph[self.base].frame
     }
 
     #[inline(always)]
@@ -526,7 +529,7 @@ impl<'a, const N: usize> Evaluation<'a, N> {
                 return Some(Register::of(self.code.const_value(i)));
             }
             Source::Operand(Operand::Local(slot)) => self.node(slot),
-            Source::Operand(o) => &self.graph.nodes[self.graph.resolve(self.frame(), o)? as usize],
+            Source::Operand(o) => &self.graph[self.graph.resolve(self.frame(), o)?],
         };
         (node.state == State::Clean).then(|| Register::of(&node.value))
     }

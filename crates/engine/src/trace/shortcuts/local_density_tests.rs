@@ -69,7 +69,7 @@ fn same_state(trace: &mut Trace, t: Target, dist: &Dist, value: &Datum) -> bool 
     assert_eq!(state(&assigned), state(&updated));
     // Computed values agree too, and so does the effect of the next update.
     let same_nodes = |a: &Trace, b: &Trace| {
-        for (a, b) in a.graph.nodes.iter().zip(&b.graph.nodes) {
+        for ((_, a), (_, b)) in a.graph.store.nodes().zip(b.graph.store.nodes()) {
             // Distributions are the same only if they are one object.
             let same_value = match (&a.value, &b.value) {
                 (Value::Dist(a), Value::Dist(b)) => format!("{a:?}") == format!("{b:?}"),

@@ -26,14 +26,14 @@ impl Graph {
     ) -> Option<(&'c StaticScaffold, u64)> {
         let facts = self.slot_facts(code, target.node);
         let scaffold = facts.scaffold.as_ref()?;
-        if !self.incremental || self.nodes[target.node as usize].state != State::Clean {
+        if !self.incremental || self.store[target.node].state != State::Clean {
             return None;
         }
         let mut leaves = self.is_read_outside(target.node);
         for slot in &scaffold.slots {
-            let m = target.node - facts.slot + slot;
+            let m = target.node - facts.slot + *slot;
             leaves |= self.is_read_outside(m);
-            let node = &self.nodes[m as usize];
+            let node = &self.store[m];
             // The value of a choice that is not plain may change with its parameters.
             let plain = matches!(node.value, Value::Num(_) | Value::Bool(_)) && node.side.is_none();
             if node.state == State::Clean && self.slot_facts(code, m).is_draw && !plain {
@@ -46,12 +46,6 @@ impl Graph {
         (scaffold.is_closed || !leaves).then_some((scaffold, conditional))
     }
 
-    /// Whether nodes of other frames read this one.
-    pub fn is_read_outside(&self, n: NodeId) -> bool {
-        let users = &self.outside[self.nodes[n as usize].outside as usize];
-        users.users.len() > users.gone as usize
-    }
-
     /// Changes a choice and updates what depends on it.
     pub fn update_along_scaffold(
         &mut self,
@@ -61,26 +55,31 @@ impl Graph {
         (scaffold, conditional): (&StaticScaffold, u64),
     ) -> Result<(), Failure> {
         let n = target.node;
-        self.pending.push(Pending { node: n, element: target.element, change: change.clone() });
-        self.save(n);
-        self.nodes[n as usize].flags |= TARGET;
+        self.update.pending.push(Pending {
+            node: n,
+            element: target.element,
+            change: change.clone(),
+        });
+        self.update.save(&mut self.store, n);
+        self.store[n].flags |= TARGET;
         self.rerun(code, n)?;
         let base = n - self.slot_facts(code, n).slot;
         for (i, slot) in scaffold.slots.iter().enumerate() {
-            let m = base + slot;
-            if self.nodes[m as usize].state == State::Clean && self.reads_changed(code, m) {
+            let m = base + *slot;
+            if self.store[m].state == State::Clean && self.reads_changed(code, m) {
                 if conditional >> i & 1 == 0 {
                     self.rerun(code, m)?;
                 } else {
-                    self.make_stale(code, m);
+                    self.update.make_stale(&mut self.store, code, m);
                 }
             }
         }
-        for m in std::iter::once(n).chain(scaffold.slots.iter().map(|slot| base + slot)) {
-            let node = &self.nodes[m as usize];
-            if (node.changed == self.epoch || node.state == State::Stale) && self.is_read_outside(m)
+        for m in std::iter::once(n).chain(scaffold.slots.iter().map(|slot| base + *slot)) {
+            let node = &self.store[m];
+            if (node.changed == self.update.epoch || node.state == State::Stale)
+                && self.is_read_outside(m)
             {
-                self.invalidate_outside_users(code, m);
+                self.update.invalidate_outside_users(&mut self.store, code, m);
             }
         }
         self.propagate(code)
@@ -89,28 +88,28 @@ impl Graph {
     fn reads_changed(&self, code: &Code, n: NodeId) -> bool {
         let mut changed = false;
         self.each_dep(code, n, |d, _| {
-            let dep = &self.nodes[d as usize];
-            changed |= dep.changed == self.epoch || dep.state == State::Stale;
+            let dep = &self.store[d];
+            changed |= dep.changed == self.update.epoch || dep.state == State::Stale;
         });
         changed
     }
 
     /// Runs an evaluated node again.
     fn rerun(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
-        self.save(n);
-        let node = &mut self.nodes[n as usize];
+        self.update.save(&mut self.store, n);
+        let node = &mut self.store[n];
         node.state = State::Running;
         node.flags |= WAS_STALE;
-        let bottom = self.stack.len();
-        self.stack.push(n);
+        let bottom = self.update.stack.len();
+        self.update.stack.push(n);
         match self.run(code, n) {
             Ok(Poll::Ready) => {
-                self.stack.truncate(bottom);
+                self.update.stack.truncate(bottom);
                 Ok(())
             }
             Ok(Poll::Pending) => self.run_stack(code, bottom),
             Err(e) => {
-                self.stack.truncate(bottom);
+                self.update.stack.truncate(bottom);
                 Err(e)
             }
         }

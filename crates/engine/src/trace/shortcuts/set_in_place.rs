@@ -52,15 +52,15 @@ impl Graph {
                 for (slot, r) in
                     placed.local_density.results.iter().filter(|(_, r)| e.is_filled(*r))
                 {
-                    let n = placed.base + slot;
-                    if self.nodes[n as usize].state == State::Empty {
+                    let n = placed.base + *slot;
+                    if self.store[n].state == State::Empty {
                         following.fresh.push((n, e.value_in(*r)));
                     }
                 }
             }
             for slot in &placed.local_density.computations {
-                let n = placed.base + slot;
-                if self.nodes[n as usize].state == State::Clean {
+                let n = placed.base + *slot;
+                if self.store[n].state == State::Clean {
                     let mut results = placed.local_density.results.iter();
                     match results.find(|(s, r)| s == slot && e.is_filled(*r)) {
                         Some((_, r)) => following.values.push((n, e.value_in(*r))),
@@ -74,20 +74,19 @@ impl Graph {
         }
         following.turned = e.turned;
         let (scores, prior, likelihood) = (e.scores, e.prior, e.likelihood);
-        let is_total =
-            |n: NodeId| matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Total(_)));
+        let is_total = |n: NodeId| matches!(self.store[n].side.as_deref(), Some(Side::Total(_)));
         if scores.iter().any(|(n, _)| is_total(*n)) || !self.follow(code, following) {
             return false;
         }
         self.revision += 1;
         let score = dist.log_density_stored(value);
-        self.prior.sub(self.nodes[target as usize].score);
-        self.prior.add(score);
-        self.prior.merge(&prior);
-        self.likelihood.merge(&likelihood);
-        self.nodes[target as usize].score = score;
+        self.score.prior.sub(self.store[target].score);
+        self.score.prior.add(score);
+        self.score.prior.merge(&prior);
+        self.score.likelihood.merge(&likelihood);
+        self.store[target].score = score;
         for (n, score) in scores {
-            self.nodes[n as usize].score = score;
+            self.store[n].score = score;
         }
         true
     }
@@ -97,17 +96,17 @@ impl Graph {
     fn follow(&mut self, code: &Code, following: Following) -> bool {
         if following.turned.is_empty() {
             for (n, value) in following.values {
-                self.nodes[n as usize].value = value;
+                self.store[n].value = value;
             }
             return following.unasked.is_empty();
         }
         let before = self.begin();
         for (n, value) in following.values {
-            self.save(n);
-            self.nodes[n as usize].value = value;
+            self.update.save(&mut self.store, n);
+            self.store[n].value = value;
         }
         let turned = self.turn(code, &following.turned, &following.fresh);
-        let is_asked = |n: &NodeId| self.nodes[*n as usize].state != State::Empty;
+        let is_asked = |n: &NodeId| self.store[*n].state != State::Empty;
         if turned.is_none() || following.unasked.iter().any(is_asked) {
             self.rollback(code, before);
             return false;
@@ -127,16 +126,16 @@ impl Graph {
         // Acquire before releasing: one may acquire what another releases.
         for n in selections {
             let (taken, _) = self.ways(code, *n)?;
-            if let Some(d) = self.resolve(self.nodes[*n as usize].frame, taken) {
+            if let Some(d) = self.resolve(self.store[*n].frame, taken) {
                 self.take_up(code, d, *n, !matches!(taken, Operand::Local(_)), fresh)?;
             }
         }
         for n in selections {
             let (_, left) = self.ways(code, *n)?;
-            if let Some(d) = self.resolve(self.nodes[*n as usize].frame, left) {
+            if let Some(d) = self.resolve(self.store[*n].frame, left) {
                 self.release(d, !matches!(left, Operand::Local(_)));
             }
-            self.nodes[*n as usize].flags ^= OTHERWISE;
+            self.store[*n].flags ^= OTHERWISE;
         }
         self.sweep(code);
         Some(())
@@ -151,16 +150,16 @@ impl Graph {
         outside: bool,
         fresh: &[(NodeId, Value)],
     ) -> Option<()> {
-        if self.nodes[d as usize].state == State::Empty {
+        if self.store[d].state == State::Empty {
             let known = fresh
                 .iter()
                 .find(|(n, _)| *n == d && !matches!(self.op(code, d), Op::Select { .. }));
             match known {
                 Some((_, value)) => {
-                    self.save(d);
-                    let node = &mut self.nodes[d as usize];
+                    self.update.save(&mut self.store, d);
+                    let node = &mut self.store[d];
                     node.value = value.clone();
-                    node.changed = self.epoch;
+                    node.changed = self.update.epoch;
                     node.state = State::Clean;
                     node.flags |= HELD;
                     let mut read: SmallVec<[(NodeId, bool); 8]> = SmallVec::new();
@@ -178,7 +177,7 @@ impl Graph {
     /// Returns the alternative that a selection does not hold, and the one that it holds.
     fn ways(&self, code: &Code, n: NodeId) -> Option<(Operand, Operand)> {
         let Op::Select { then, otherwise, .. } = self.op(code, n) else { return None };
-        let is_first = self.nodes[n as usize].flags & OTHERWISE == 0;
+        let is_first = self.store[n].flags & OTHERWISE == 0;
         Some(if is_first { (*otherwise, *then) } else { (*then, *otherwise) })
     }
 }

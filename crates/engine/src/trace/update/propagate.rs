@@ -35,46 +35,53 @@ impl Graph {
             self.run_effects(code)?;
             // A stale choice may acquire what another node released, so stale choices run
             // before the sweep, except those that are to be swept themselves.
-            if self.unheld.is_empty() && self.idle.is_empty() {
-                let Some(n) = self.stale_choices.pop() else { break };
-                if self.nodes[n as usize].state == State::Stale {
+            if self.update.unheld.is_empty() && self.update.idle.is_empty() {
+                let Some(n) = self.update.stale_choices.pop() else { break };
+                if self.store[n].state == State::Stale {
                     self.run_in_place(code, n)?;
                 }
                 continue;
             }
-            let unreachable =
-                if self.stale_choices.is_empty() { Vec::new() } else { self.unreachable(code) };
-            let stays = |n: &NodeId| {
-                self.nodes[*n as usize].state == State::Stale
-                    && unreachable.binary_search(n).is_err()
+            let unreachable = if self.update.stale_choices.is_empty() {
+                Vec::new()
+            } else {
+                self.unreachable(code)
             };
-            let next = self.stale_choices.iter().rposition(stays).filter(|_| self.idle.is_empty());
+            let stays = |n: &NodeId| {
+                self.store[*n].state == State::Stale && unreachable.binary_search(n).is_err()
+            };
+            let next = self
+                .update
+                .stale_choices
+                .iter()
+                .rposition(stays)
+                .filter(|_| self.update.idle.is_empty());
             match next {
                 Some(i) => {
-                    let n = self.stale_choices.swap_remove(i);
+                    let n = self.update.stale_choices.swap_remove(i);
                     self.run_in_place(code, n)?;
                 }
                 None => self.sweep(code),
             }
         }
         self.sweep(code);
-        self.update_selections(code)
+        self.choices.update_selections(&self.store, &mut self.update, code)
     }
 
     /// Returns the nodes that a sweep would empty now, if nothing released is acquired
     /// again; sorted.
     fn unreachable(&self, code: &Code) -> Vec<NodeId> {
-        let mut open = self.unheld.clone();
-        open.retain(|n| self.nodes[*n as usize].refs == 0);
+        let mut open = self.update.unheld.clone();
+        open.retain(|n| self.store[*n].refs == 0);
         let (mut unreachable, mut left) = (Vec::new(), FxHashMap::<NodeId, u32>::default());
         while let Some(n) = open.pop() {
-            let node = &self.nodes[n as usize];
+            let node = &self.store[n];
             if node.state == State::Empty {
                 continue;
             }
             unreachable.push(n);
             let mut release = |d: NodeId| {
-                let refs = left.entry(d).or_insert(self.nodes[d as usize].refs);
+                let refs = left.entry(d).or_insert(self.store[d].refs);
                 *refs = refs.saturating_sub(1);
                 if *refs == 0 {
                     open.push(d);
@@ -84,11 +91,8 @@ impl Graph {
                 self.each_dep(code, n, |d, _| release(d));
             }
             if let Some(Side::Child(c)) = node.side.as_deref() {
-                let frame = &self.frames[c.frame as usize];
-                code.blocks[frame.block as usize]
-                    .effects
-                    .iter()
-                    .for_each(|s| release(frame.base + s));
+                let frame = &self.store[c.frame];
+                code.blocks[frame.block].effects.iter().for_each(|s| release(frame.base + *s));
             }
         }
         unreachable.sort_unstable();
@@ -96,27 +100,27 @@ impl Graph {
     }
 
     fn run_effects(&mut self, code: &Code) -> Result<(), Failure> {
-        let mut stale = std::mem::take(&mut self.stale_effects);
+        let mut stale = std::mem::take(&mut self.update.stale_effects);
         let mut result = Ok(());
         for n in stale.drain(..) {
-            if self.nodes[n as usize].state == State::Stale {
+            if self.store[n].state == State::Stale {
                 result = self.run_in_place(code, n);
                 if result.is_err() {
                     break;
                 }
             }
         }
-        self.stale_effects = stale;
+        self.update.stale_effects = stale;
         result?;
         let mut next = 0;
-        while next < self.effects.len() {
-            let n = self.effects[next];
+        while next < self.update.effects.len() {
+            let n = self.update.effects[next];
             next += 1;
-            if self.nodes[n as usize].state == State::Empty && self.nodes[n as usize].refs > 0 {
+            if self.store[n].state == State::Empty && self.store[n].refs > 0 {
                 self.run_in_place(code, n)?;
             }
         }
-        self.effects.clear();
+        self.update.effects.clear();
         Ok(())
     }
 
@@ -124,18 +128,18 @@ impl Graph {
     /// frame: outer owners decide whether inner ones still exist.
     fn run_in_place(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
         let mut owners: SmallVec<[NodeId; 8]> = SmallVec::new();
-        let mut f = self.nodes[n as usize].frame;
-        while self.frames[f as usize].owner != NONE {
-            let owner = self.frames[f as usize].owner;
+        let mut f = self.store[n].frame;
+        while self.store[f].owner != NodeId::NONE {
+            let owner = self.store[f].owner;
             owners.push(owner);
-            f = self.nodes[owner as usize].frame;
+            f = self.store[owner].frame;
         }
         while let Some(owner) = owners.pop() {
-            if self.nodes[owner as usize].state == State::Stale {
+            if self.store[owner].state == State::Stale {
                 self.evaluate(code, owner)?;
             }
             let below = owners.last().copied().unwrap_or(n);
-            if !self.frames[self.nodes[below as usize].frame as usize].attached {
+            if !self.store[self.store[below].frame].attached {
                 return Ok(());
             }
         }
@@ -144,36 +148,40 @@ impl Graph {
 
     /// Brings a node up to date.
     pub fn evaluate(&mut self, code: &Code, root: NodeId) -> Result<(), Failure> {
-        let bottom = self.stack.len();
-        self.stack.push(root);
+        let bottom = self.update.stack.len();
+        self.update.stack.push(root);
         self.run_stack(code, bottom)
     }
 
     /// Evaluates the nodes on the stack until it is down to height `bottom`.
     pub fn run_stack(&mut self, code: &Code, bottom: usize) -> Result<(), Failure> {
-        while self.stack.len() > bottom {
-            let n = self.stack[self.stack.len() - 1];
-            match self.nodes[n as usize].state {
+        while self.update.stack.len() > bottom {
+            let n = self.update.stack[self.update.stack.len() - 1];
+            match self.store[n].state {
                 State::Clean => {
-                    self.stack.pop();
+                    self.update.stack.pop();
                     continue;
                 }
                 State::Running => {}
                 state => {
-                    self.save(n);
-                    let node = &mut self.nodes[n as usize];
+                    self.update.save(&mut self.store, n);
+                    let node = &mut self.store[n];
                     node.state = State::Running;
                     if state == State::Stale {
                         node.flags |= WAS_STALE;
                     }
                 }
             }
-            match self.count_operation(code, n).and_then(|()| self.step(code, n)) {
+            match self
+                .budget
+                .count_operation(&self.store, code, n)
+                .and_then(|()| self.step(code, n))
+            {
                 Ok(Poll::Ready) => {}
                 Ok(Poll::Pending) => {}
                 Err(e) => {
-                    self.failed.clear();
-                    self.failed.extend(self.stack.drain(bottom..));
+                    self.update.failed.clear();
+                    self.update.failed.extend(self.update.stack.drain(bottom..));
                     return Err(e);
                 }
             }
@@ -183,21 +191,21 @@ impl Graph {
 
     /// Pushes a node that is needed onto the stack.
     pub fn need(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        if self.nodes[n as usize].state == State::Running {
+        if self.store[n].state == State::Running {
             let message = match self.name_of(code, n) {
                 Some(name) => format!("`{name}` depends on its own value"),
                 None => "this value depends on itself".to_owned(),
             };
             return Err(self.fail(code, n, FaultKind::Cycle, message, None));
         }
-        self.stack.push(n);
+        self.update.stack.push(n);
         Ok(Poll::Pending)
     }
 
     /// Ends the evaluation of a node with a value.
     pub fn finish(&mut self, code: &Code, n: NodeId, value: Value) -> Poll {
-        let epoch = self.epoch;
-        let node = &mut self.nodes[n as usize];
+        let epoch = self.update.epoch;
+        let node = &mut self.store[n];
         if node.flags & WAS_STALE == 0 || !value.same(&node.value) {
             node.value = value;
             node.changed = epoch;
@@ -208,13 +216,13 @@ impl Graph {
     /// Ends the evaluation of a node with a newly built value, which counts towards the
     /// limits.
     pub fn finish_made(&mut self, code: &Code, n: NodeId, value: Value) -> Result<Poll, Failure> {
-        self.count_elements(code, n, &value)?;
+        self.budget.count_elements(&self.store, code, n, &value)?;
         Ok(self.finish(code, n, value))
     }
 
     /// Ends the evaluation of a node whose value does not change.
     pub fn finish_unchanged(&mut self, code: &Code, n: NodeId) -> Poll {
-        let node = &mut self.nodes[n as usize];
+        let node = &mut self.store[n];
         node.state = State::Clean;
         node.flags &= !WAS_STALE;
         if node.flags & HELD == 0 {
@@ -230,31 +238,31 @@ impl Graph {
 
     /// Replaces the nodes that a node holds besides its operands.
     pub fn set_deps(&mut self, n: NodeId, deps: Deps) {
-        if deps.is_empty() && self.nodes[n as usize].side.is_none() {
+        if deps.is_empty() && self.store[n].side.is_none() {
             return;
         }
-        let held = self.nodes[n as usize].flags & HELD != 0;
-        let old = match self.nodes[n as usize].side.as_deref() {
+        let held = self.store[n].flags & HELD != 0;
+        let old = match self.store[n].side.as_deref() {
             Some(Side::Deps(old) | Side::Kept(Kept { deps: old, .. })) => old.clone(),
             Some(Side::Choice(c)) => c.deps.clone(),
             Some(Side::Total(t)) => t.deps.clone(),
             _ => Deps::new(),
         };
-        if old == deps && !matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Kept(_))) {
+        if old == deps && !matches!(self.store[n].side.as_deref(), Some(Side::Kept(_))) {
             return;
         }
         if held {
             deps.iter().for_each(|d| self.acquire(*d, n, true));
             old.iter().for_each(|d| self.release(*d, true));
         }
-        match self.nodes[n as usize].side.as_deref_mut() {
+        match self.store[n].side.as_deref_mut() {
             Some(Side::Choice(c)) => {
-                self.journal.push(Entry::Choice(n, Box::new(c.clone())));
+                self.update.note(Entry::Choice(n, Box::new(c.clone())));
                 c.deps = deps;
             }
             Some(Side::Total(t)) => {
                 let old = std::mem::replace(&mut t.deps, deps);
-                self.note(Entry::TotalDeps(n, old));
+                self.update.note(Entry::TotalDeps(n, old));
             }
             _ => self.set_side(n, if deps.is_empty() { None } else { Some(Side::Deps(deps)) }),
         }
@@ -263,34 +271,26 @@ impl Graph {
     /// Stores the evaluation of an incremental function, and the nodes held besides the
     /// operands.
     pub fn keep(&mut self, n: NodeId, deps: Deps, before: PreviousEvaluation) {
-        let old = match self.nodes[n as usize].side.as_deref() {
+        let old = match self.store[n].side.as_deref() {
             Some(Side::Deps(old) | Side::Kept(Kept { deps: old, .. })) => old.clone(),
             _ => Deps::new(),
         };
-        if self.nodes[n as usize].flags & HELD != 0 && old != deps {
+        if self.store[n].flags & HELD != 0 && old != deps {
             deps.iter().for_each(|d| self.acquire(*d, n, true));
             old.iter().for_each(|d| self.release(*d, true));
         }
         self.set_side(n, Some(Side::Kept(Kept { deps, before: Arc::new(before) })));
     }
 
-    /// Returns the previous evaluation that an incremental function may start from.
-    pub fn kept(&self, n: NodeId) -> Option<&Arc<PreviousEvaluation>> {
-        match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Kept(k)) if self.incremental => Some(&k.before),
-            _ => None,
-        }
-    }
-
     /// Makes one attempt to evaluate a node.
     fn step(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        if self.nodes[n as usize].flags & WAS_STALE != 0 && self.incremental {
+        if self.store[n].flags & WAS_STALE != 0 && self.incremental {
             let mut changed = false;
-            let mut wait = NONE;
-            let epoch = self.epoch;
+            let mut wait = NodeId::NONE;
+            let epoch = self.update.epoch;
             self.each_dep(code, n, |d, _| {
-                let dep = &self.nodes[d as usize];
-                if !changed && wait == NONE {
+                let dep = &self.store[d];
+                if !changed && wait == NodeId::NONE {
                     if dep.state != State::Clean {
                         wait = d;
                     } else if dep.changed == epoch {
@@ -299,14 +299,14 @@ impl Graph {
                 }
             });
             if !changed {
-                if wait != NONE {
+                if wait != NodeId::NONE {
                     return self.need(code, wait);
                 }
                 // Elements of passes also read their owner, and targets their pending
                 // change.
                 let op = self.op(code, n);
                 let reads_more = matches!(op, Op::Item | Op::Accumulator | Op::Param { .. });
-                if !reads_more && self.nodes[n as usize].flags & TARGET == 0 {
+                if !reads_more && self.store[n].flags & TARGET == 0 {
                     return Ok(self.finish_unchanged(code, n));
                 }
             }
@@ -316,9 +316,17 @@ impl Graph {
 
     /// Makes one attempt to run the operation of a node.
     pub fn run(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let step = self.run_op(code, n)?;
+        let step = self.run_op(code, n).map_err(|mut e| {
+            // A choice outside of its support, such as a label beyond the number of groups,
+            // gives the state density zero, whatever it indexes. A choice is scored before
+            // anything that depends on it is evaluated.
+            if e.kind == FaultKind::Index && self.score.prior.value() == f64::NEG_INFINITY {
+                e.kind = FaultKind::Domain;
+            }
+            e
+        })?;
         if let (Poll::Ready, Some(log)) = (&step, &mut self.execution_log) {
-            let f = &self.frames[self.nodes[n as usize].frame as usize];
+            let f = &self.store[self.store[n].frame];
             log.push((f.block, n - f.base));
         }
         Ok(step)
