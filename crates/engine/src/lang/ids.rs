@@ -2,6 +2,26 @@
 
 use std::ops::{Add, Index, IndexMut, Sub};
 
+macro_rules! table {
+    ($id:ident, $table:ty) => {
+        impl<T> Index<$id> for $table {
+            type Output = T;
+
+            #[inline]
+            fn index(&self, id: $id) -> &T {
+                &self[id.0 as usize]
+            }
+        }
+
+        impl<T> IndexMut<$id> for $table {
+            #[inline]
+            fn index_mut(&mut self, id: $id) -> &mut T {
+                &mut self[id.0 as usize]
+            }
+        }
+    };
+}
+
 macro_rules! ids {
     ($($(#[$doc:meta])* $name:ident;)*) => { $(
         $(#[$doc])*
@@ -23,37 +43,8 @@ macro_rules! ids {
             }
         }
 
-        impl<T> Index<$name> for [T] {
-            type Output = T;
-
-            #[inline]
-            fn index(&self, id: $name) -> &T {
-                &self[id.0 as usize]
-            }
-        }
-
-        impl<T> IndexMut<$name> for [T] {
-            #[inline]
-            fn index_mut(&mut self, id: $name) -> &mut T {
-                &mut self[id.0 as usize]
-            }
-        }
-
-        impl<T> Index<$name> for Vec<T> {
-            type Output = T;
-
-            #[inline]
-            fn index(&self, id: $name) -> &T {
-                &self[id.0 as usize]
-            }
-        }
-
-        impl<T> IndexMut<$name> for Vec<T> {
-            #[inline]
-            fn index_mut(&mut self, id: $name) -> &mut T {
-                &mut self[id.0 as usize]
-            }
-        }
+        table!($name, [T]);
+        table!($name, Vec<T>);
     )* };
 }
 

@@ -151,7 +151,7 @@ pub trait Likelihood: fmt::Debug + Send + Sync {
         None
     }
 
-    /// Whether the density has steps, so that [`Likelihood::gradient`] is that of a smoothed
+    /// True if the density has steps, so that [`Likelihood::gradient`] is that of a smoothed
     /// one: trajectories that follow it are mostly rejected.
     fn has_steps(&self) -> bool {
         false
@@ -187,7 +187,7 @@ pub const MOST_ELEMENTS: usize = 10_000_000;
 /// The maximum nesting depth of arrays and records, distributions, and covariances.
 pub const MOST_NESTED: u32 = 200;
 
-/// Whether a value is within the limits.
+/// True if a value is within the limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
     /// It is.
@@ -287,7 +287,7 @@ impl Value {
         }
     }
 
-    /// Whether it is an array or record without elements.
+    /// True if it is an array or record without elements.
     pub fn is_empty(&self) -> bool {
         self.len() == Some(0)
     }
@@ -301,7 +301,7 @@ impl Value {
         }
     }
 
-    /// Whether two values are the same to the last bit. Shared data are compared by
+    /// True if two values are the same to the last bit. Shared data are compared by
     /// pointer first, objects only by pointer. It is used to stop propagation, so a false
     /// negative costs time but is never wrong.
     pub fn same(&self, other: &Value) -> bool {

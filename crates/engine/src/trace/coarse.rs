@@ -64,7 +64,7 @@ impl Trace {
         support.coarse_coordinate(x, kept, uniform)
     }
 
-    /// What a checkpoint keeps of this: the number of commits, and coordinates by the
+    /// The part of this that a checkpoint keeps: the number of commits, and coordinates by the
     /// hashes of their choices' addresses.
     #[doc(hidden)]
     pub fn coarse_state(&self) -> CoarseState {

@@ -1,7 +1,7 @@
 //! Explanations of a trace: what an update of a choice would affect, and which choices
 //! something depends on.
 //!
-//! What is affected is found by invalidation, as in an update (`invalidate.rs`), which is
+//! The affected part is found by invalidation, as in an update (`invalidate.rs`), which is
 //! then undone. Nothing is evaluated.
 
 use super::node::*;
@@ -140,7 +140,7 @@ impl Store {
         sum.value()
     }
 
-    /// Whether a node that decides whether `n` exists is stale: the condition of a branch
+    /// True if a node that decides whether `n` exists is stale: the condition of a branch
     /// around it, or what a loop runs over.
     fn hangs_on_marked(&self, code: &Code, n: NodeId) -> bool {
         let mut deciding = Vec::new();

@@ -77,7 +77,7 @@ impl Trace {
         if t.element == NONE { h } else { eval::choice::element_hash(h, t.element as usize) }
     }
 
-    /// Whether a target that was listed earlier is still a choice of this trace.
+    /// True if a target that was listed earlier is still a choice of this trace.
     pub fn is_active(&self, t: Target) -> bool {
         let node = self.graph.store.get(t.node);
         node.is_some_and(|n| n.state == State::Clean)
@@ -150,7 +150,7 @@ impl Trace {
         self.all_targets().len()
     }
 
-    /// Whether the state has observations or factors; otherwise draws are those of the prior.
+    /// True if the state has observations or factors; otherwise draws are those of the prior.
     #[doc(hidden)]
     pub fn is_conditioned(&self) -> bool {
         self.scored_nodes().next().is_some()
@@ -199,7 +199,7 @@ impl Trace {
         self.code.blocks[frame.block].spans[n - frame.base]
     }
 
-    /// Whether an observation has an unnormalised likelihood, whose scale is a modelling
+    /// True if an observation has an unnormalised likelihood, whose scale is a modelling
     /// decision.
     pub fn is_pseudo(&self) -> bool {
         self.likelihoods().any(|(l, _)| !l.is_proper())

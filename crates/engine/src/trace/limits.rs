@@ -127,17 +127,17 @@ impl Stop {
         Stop { patience, ..self }
     }
 
-    /// Whether a flag is set.
+    /// True if a flag is set.
     pub fn is_set(&self) -> bool {
         self.asked.iter().any(|a| a.load(Ordering::Relaxed))
     }
 
-    /// Whether a stop was requested or time is up.
+    /// True if a stop was requested or time is up.
     pub fn is_asked(&self) -> bool {
         self.has_used(1.0)
     }
 
-    /// Whether a stop was requested or this fraction of the time has passed.
+    /// True if a stop was requested or this fraction of the time has passed.
     pub fn has_used(&self, share: f64) -> bool {
         self.is_set()
             || self

@@ -242,7 +242,7 @@ impl Trace {
             .collect()
     }
 
-    /// Whether the pending proposal removes a choice. This includes a choice that is
+    /// True if the pending proposal removes a choice. This includes a choice that is
     /// resampled at the same address because its form changed; the value proposed for it
     /// had no effect.
     pub fn was_removed(&self, t: Target) -> bool {
@@ -359,7 +359,7 @@ impl Trace {
         self.graph.gradient(&self.code, targets, &scored, (power, weight), out)
     }
 
-    /// Whether nothing has been committed since the program was run.
+    /// True if nothing has been committed since the program was run.
     #[doc(hidden)]
     pub fn is_new(&self) -> bool {
         self.graph.revision == 0

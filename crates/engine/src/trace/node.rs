@@ -19,7 +19,7 @@ pub(crate) use crate::lang::ids::{BlockId, FrameId, NodeId, OpId, SiteId, Slot};
 /// Not an element: a whole choice.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// Whether a node's value is up to date.
+/// True if a node's value is up to date.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum State {
     /// Not evaluated: nothing needs it.
@@ -53,7 +53,7 @@ pub(crate) const SAVED: u8 = 32;
 pub(crate) struct Node {
     /// Its value; `nothing` while empty.
     pub value: Value,
-    /// Whether its value is up to date.
+    /// True if its value is up to date.
     pub state: State,
     /// [`HELD`], [`TARGET`], [`WAS_STALE`], [`IMPROPER`], [`OTHERWISE`], [`SAVED`].
     pub flags: u8,
@@ -98,6 +98,32 @@ pub(crate) enum Side {
     Choice(ChoiceSide),
     /// An observed array, or an observation that reads containers.
     Total(Total),
+}
+
+impl Side {
+    /// Returns the nodes held besides the operands and the result.
+    pub fn deps(&self) -> &[NodeId] {
+        match self {
+            Side::Deps(deps)
+            | Side::Kept(Kept { deps, .. })
+            | Side::MemoCall(MemoCall { deps, .. })
+            | Side::Loop(Loop { deps, .. })
+            | Side::Table(Table { deps, .. })
+            | Side::Choice(ChoiceSide { deps, .. })
+            | Side::Total(Total { deps, .. }) => deps,
+            Side::Child(_) | Side::Memo(_) => &[],
+        }
+    }
+
+    /// Returns where the node with the result of a call, branch or loop is kept.
+    pub fn result(&mut self) -> Option<&mut NodeId> {
+        match self {
+            Side::Child(Child { result, .. })
+            | Side::MemoCall(MemoCall { result, .. })
+            | Side::Loop(Loop { result, .. }) => Some(result),
+            _ => None,
+        }
+    }
 }
 
 /// Nodes held besides the operands.
@@ -246,6 +272,13 @@ pub(crate) struct ChoiceSide {
     pub deps: Deps,
 }
 
+impl Default for ChoiceSide {
+    fn default() -> ChoiceSide {
+        let (stored, scores, deps) = (None, Vec::new(), Deps::new());
+        ChoiceSide { stored, scores, elements: NONE, hash: None, deps }
+    }
+}
+
 /// The source of a function's parameters.
 #[derive(Clone, Debug)]
 pub(crate) enum Arguments {
@@ -286,7 +319,7 @@ pub(crate) struct Frame {
     pub key: Option<Key>,
     /// The source of its parameters.
     pub args: Arguments,
-    /// Whether its owner still uses it.
+    /// True if its owner still uses it.
     pub attached: bool,
 }
 

@@ -35,37 +35,28 @@ pub(crate) struct Store {
     pub incremental: bool,
 }
 
-impl Index<NodeId> for Store {
-    type Output = Node;
+macro_rules! table {
+    ($id:ty, $item:ty, $table:ident) => {
+        impl Index<$id> for Store {
+            type Output = $item;
 
-    #[inline]
-    fn index(&self, n: NodeId) -> &Node {
-        &self.nodes[n]
-    }
+            #[inline]
+            fn index(&self, id: $id) -> &$item {
+                &self.$table[id]
+            }
+        }
+
+        impl IndexMut<$id> for Store {
+            #[inline]
+            fn index_mut(&mut self, id: $id) -> &mut $item {
+                &mut self.$table[id]
+            }
+        }
+    };
 }
 
-impl IndexMut<NodeId> for Store {
-    #[inline]
-    fn index_mut(&mut self, n: NodeId) -> &mut Node {
-        &mut self.nodes[n]
-    }
-}
-
-impl Index<FrameId> for Store {
-    type Output = Frame;
-
-    #[inline]
-    fn index(&self, f: FrameId) -> &Frame {
-        &self.frames[f]
-    }
-}
-
-impl IndexMut<FrameId> for Store {
-    #[inline]
-    fn index_mut(&mut self, f: FrameId) -> &mut Frame {
-        &mut self.frames[f]
-    }
-}
+table!(NodeId, Node, nodes);
+table!(FrameId, Frame, frames);
 
 impl Store {
     /// Creates the store of a program that has not run: the frame of the top level.
@@ -349,33 +340,22 @@ impl Store {
 
     /// The part of [`Graph::each_dep`] that is not operands.
     pub fn each_side_dep(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId, bool)) {
-        match self[n].side.as_deref() {
-            Some(Side::Deps(deps) | Side::Kept(Kept { deps, .. })) => {
-                deps.iter().for_each(|d| f(*d, true))
-            }
-            Some(Side::Child(c)) if c.result != NodeId::NONE => {
+        let Some(side) = self[n].side.as_deref() else { return };
+        side.deps().iter().for_each(|d| f(*d, true));
+        match side {
+            Side::Child(c) if c.result != NodeId::NONE => {
                 f(c.result, !self.is_owned_result(code, c.result, n))
             }
-            Some(Side::MemoCall(c)) => {
-                c.deps.iter().for_each(|d| f(*d, true));
-                if c.result != NodeId::NONE {
-                    f(c.result, true);
-                }
+            Side::MemoCall(MemoCall { result, .. }) | Side::Loop(Loop { result, .. })
+                if *result != NodeId::NONE =>
+            {
+                f(*result, true)
             }
-            Some(Side::Choice(c)) => c.deps.iter().for_each(|d| f(*d, true)),
-            Some(Side::Total(t)) => t.deps.iter().for_each(|d| f(*d, true)),
-            Some(Side::Loop(l)) => {
-                l.deps.iter().for_each(|d| f(*d, true));
-                if l.result != NodeId::NONE {
-                    f(l.result, true);
-                }
-            }
-            Some(Side::Table(t)) => t.deps.iter().for_each(|d| f(*d, true)),
             _ => {}
         }
     }
 
-    /// Whether a parameter's value comes with its frame rather than from an argument.
+    /// True if a parameter's value comes with its frame rather than from an argument.
     fn has_own_value(&self, n: NodeId) -> bool {
         let frame = &self[self[n].frame];
         let i = (n - frame.base).index();
@@ -387,7 +367,7 @@ impl Store {
         }
     }
 
-    /// Whether the link from a frame's result to the frame's owner can be derived from
+    /// True if the link from a frame's result to the frame's owner can be derived from
     /// the block.
     pub fn is_owned_result(&self, code: &Code, result: NodeId, owner: NodeId) -> bool {
         let f = &self[self[result].frame];

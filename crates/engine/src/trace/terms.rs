@@ -18,7 +18,7 @@ use pcadlang_numerics::rng::Stream;
 use std::sync::Arc;
 
 impl Store {
-    /// Whether a selector selects a choice.
+    /// True if a selector selects a choice.
     pub fn selects(&self, code: &Code, selector: &Selector, t: &Target) -> bool {
         let mut facts = self.facts(code, t.node, selector.needs_address(), None);
         if t.element != NONE && selector.needs_address() {
@@ -82,7 +82,7 @@ impl Store {
         }
     }
 
-    /// Whether a stale choice may get another value without being a target: a whitened
+    /// True if a stale choice may get another value without being a target: a whitened
     /// one moves with its distribution, and one whose key, length or kind changes is
     /// resampled.
     pub fn may_be_redrawn(&self, code: &Code, n: NodeId) -> bool {

@@ -18,7 +18,7 @@ impl<'a> Args<'a> {
         }
     }
 
-    /// Whether argument `i` has a value, from the call or from the table's default.
+    /// True if argument `i` has a value, from the call or from the table's default.
     pub fn given(&self, i: usize) -> bool {
         !matches!(self.get(i), Value::Unit)
     }

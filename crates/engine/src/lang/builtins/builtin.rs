@@ -101,7 +101,7 @@ pub enum Form {
     LogLikelihood,
 }
 
-/// What a name of inference blocks stands for.
+/// The meaning of a name of inference blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum PlanForm {
@@ -121,10 +121,10 @@ pub enum PlanForm {
     Reported,
 }
 
-/// What static checks know of a kernel.
+/// The facts about a kernel for static checks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct KernelTraits {
-    /// Whether a step is something else than a reversible move of one state.
+    /// True if a step is something else than a reversible move of one state.
     pub irreversible: bool,
     /// For a kernel that applies only reversible ones: a call of it, as an example.
     pub of_reversible: Option<&'static str>,
@@ -291,7 +291,7 @@ pub struct Builtin {
     pub section: Text,
     /// Its arguments in order.
     pub args: Arc<[Argument]>,
-    /// Whether the last argument may be repeated.
+    /// True if the last argument may be repeated.
     pub variadic: bool,
     /// The type of the result.
     pub returns: Type,
@@ -301,7 +301,7 @@ pub struct Builtin {
     pub kind: Kind,
     /// Its action on single numbers.
     pub scalar: Option<Scalar>,
-    /// What a draw is, of a family of distributions.
+    /// The meaning of a draw, for a family of distributions.
     pub drawn: Drawn,
     /// Its derivative.
     pub derivative: Derivative,

@@ -17,7 +17,7 @@ use std::sync::Arc;
 pub struct Arg {
     /// Its name, by which calls may give it.
     pub name: &'static str,
-    /// What it takes.
+    /// Its type.
     pub ty: Type,
     /// The unit of its numbers, for the reference.
     pub unit: &'static str,
@@ -59,13 +59,13 @@ pub struct Row {
     pub section: &'static str,
     /// Its arguments, in the order of a call.
     pub args: &'static [Arg],
-    /// Whether the last argument may be repeated.
+    /// True if the last argument may be repeated.
     pub variadic: bool,
-    /// What it returns.
+    /// Its result.
     pub returns: Type,
-    /// What the reference says of it.
+    /// Its text in the reference.
     pub doc: &'static str,
-    /// What it is, and how it is evaluated.
+    /// Its kind and its evaluation.
     pub kind: Kind,
     /// The same function of numbers, if there is one.
     pub scalar: Option<Scalar>,

@@ -50,9 +50,9 @@ fn form_name(name: &str, argument: &str) -> String {
 
 /// A borrowed [`FullName`], for look-ups.
 #[derive(Hash)]
-struct Sought<'a>(&'a str, &'a str);
+struct NameKey<'a>(&'a str, &'a str);
 
-impl Equivalent<FullName> for Sought<'_> {
+impl Equivalent<FullName> for NameKey<'_> {
     fn equivalent(&self, name: &FullName) -> bool {
         self.0 == name.0 && self.1 == name.1
     }
@@ -62,7 +62,7 @@ impl Equivalent<FullName> for Sought<'_> {
 /// argument by name.
 pub type Defaults = FxHashMap<(String, String), Value>;
 
-/// What a host does with a program's inputs before the program is compiled.
+/// The preparation of a program's inputs by a host before the program is compiled.
 pub trait InputHook: fmt::Debug + Send + Sync {
     /// Completes the `data` items that were given and the defaults of arguments.
     fn prepare(&self, data: &mut IndexMap<String, Value>, defaults: &mut Defaults);
@@ -75,7 +75,7 @@ pub trait InputHook: fmt::Debug + Send + Sync {
 #[derive(Clone, Debug)]
 pub struct Table {
     entries: IndexMap<FullName, Builtin, FxBuildHasher>,
-    /// What prepares the inputs of programs.
+    /// The preparation of programs' inputs.
     pub hooks: Vec<Arc<dyn InputHook>>,
 }
 
@@ -124,7 +124,7 @@ impl Table {
     /// Returns the index of a built-in; operators are named as they are written, the
     /// prefix ones `neg` and `not`.
     pub fn find(&self, module: &str, name: &str) -> Option<u32> {
-        self.entries.get_index_of(&Sought(module, name)).map(|i| i as u32)
+        self.entries.get_index_of(&NameKey(module, name)).map(|i| i as u32)
     }
 
     /// All of them, in the order of the reference.

@@ -15,6 +15,6 @@ mod slots;
 mod surrogate;
 
 pub use super::ids::{BlockId, OpId, SiteId, Slot};
-pub use op::{Callee, DistSpec, Op, Operand, Probe, Source, SourceKey};
+pub use op::{Callee, DistSpec, ElementDraw, ElementKey, Op, Operand, Probe};
 pub use program::{Block, BlockKind, Code, Eager, Force, Observed, Site, SiteSegment, SiteTag};
 pub use slots::{SlotFacts, StaticScaffold};

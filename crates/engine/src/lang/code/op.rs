@@ -54,20 +54,20 @@ pub enum Callee {
 
 /// A draw whose choices are elements of a keyed container.
 #[derive(Clone, Debug)]
-pub struct Source {
+pub struct ElementDraw {
     /// The `for` operations that lead to the draw, outermost first: a slot of the
     /// container's block, then of each body.
     pub loops: Box<[Slot]>,
     /// The draw, in the innermost body (or the container's own block).
     pub draw: Slot,
     /// Its keys.
-    pub keys: Box<[SourceKey]>,
+    pub keys: Box<[ElementKey]>,
 }
 
 /// A key of a drawn element.
 #[derive(Clone, Copy, Debug)]
-pub enum SourceKey {
-    /// The variable of the enclosing loop, by index into [`Source::loops`].
+pub enum ElementKey {
+    /// The variable of the enclosing loop, by index into [`ElementDraw::loops`].
     Loop(u32),
     /// An operand of the draw's block.
     Operand(Operand),
@@ -184,7 +184,7 @@ pub enum Op {
         /// Its name.
         name: Arc<str>,
         /// The draws of its elements.
-        sources: Box<[Source]>,
+        sources: Box<[ElementDraw]>,
     },
     /// The array or record of all elements of the container in the preceding slot.
     Gather,

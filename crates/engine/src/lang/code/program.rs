@@ -38,18 +38,18 @@ pub struct Code {
     pub samples: Vec<Operand>,
     /// `force @a = v;` statements, in order.
     pub forces: Vec<Force>,
-    /// Whether it has `freeze` statements.
+    /// True if it has `freeze` statements.
     pub has_freezes: bool,
     /// Expressions of reports and exports, by source span.
     pub queries: rustc_hash::FxHashMap<Span, Operand>,
     /// Observed values that replace those of the program, by the hash of the
     /// observation's address.
     pub observed: Arc<Observed>,
-    /// What runs even if nothing depends on it.
+    /// The slots that run even if nothing depends on them.
     pub eager: Eager,
 }
 
-/// What runs even if nothing depends on it.
+/// The slots that run even if nothing depends on them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Eager {
     /// Observations and factors: a choice that none of them depends on is not part of a

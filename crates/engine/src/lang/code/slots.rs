@@ -10,11 +10,11 @@ use crate::lang::local_density::LocalDensity;
 pub struct SlotFacts {
     /// The slot.
     pub slot: Slot,
-    /// Whether it runs even if nothing depends on it.
+    /// True if it runs even if nothing depends on it.
     pub is_effect: bool,
-    /// Whether it is a random choice.
+    /// True if it is a random choice.
     pub is_draw: bool,
-    /// Whether it is the result of its block.
+    /// True if it is the result of its block.
     pub is_result: bool,
     /// The slots it reads whenever it is evaluated: the number of levels out, and the
     /// slot there; `None` if they depend on the state.
@@ -36,11 +36,11 @@ pub struct StaticScaffold {
     /// The slots that depend on the choice, each after those it reads, up to and
     /// including observations and other choices.
     pub slots: Box<[Slot]>,
-    /// Whether none of them reads from another block.
+    /// True if none of them reads from another block.
     pub is_closed: bool,
     /// A bit mask of the slots that may not be needed any more when conditions have
     /// changed, so they must not run before the conditions.
     pub conditional: u64,
-    /// Whether the condition of a selection depends on the choice.
+    /// True if the condition of a selection depends on the choice.
     pub switches: bool,
 }

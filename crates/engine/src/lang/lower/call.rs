@@ -12,7 +12,7 @@ use pcadlang_syntax::span::Span;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-/// What a called expression refers to.
+/// The referent of a called expression.
 enum Target {
     Builtin(u32),
     Function(BlockId),

@@ -407,7 +407,7 @@ impl Lowerer<'_> {
     }
 }
 
-/// Whether an operator may take an operand of this static type.
+/// True if an operator may take an operand of this static type.
 fn operand_fits(name: &str, ty: Type) -> bool {
     match (name, ty) {
         ("==" | "!=", _) | (_, Type::Any | Type::Array) => true,

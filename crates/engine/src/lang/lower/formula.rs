@@ -1,7 +1,7 @@
 //! Expressions of inference blocks: each becomes a function of the program, whose
 //! parameters are the values that the plan supplies.
 
-use super::lowerer::{AddHint, Around, Lowerer, Lowering, Typed};
+use super::lowerer::{AddHint, Lowerer, Lowering, PlanScope, Typed};
 use super::scope::{Binding, Body, Meaning, Scope, ScopeKind};
 use crate::lang::builtins::{Builtin, PlanForm, Type};
 use crate::lang::code::{Block, BlockId, BlockKind, Op, Operand, Slot};
@@ -11,19 +11,19 @@ use pcadlang_syntax::span::Span;
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
-/// What a function reads.
+/// The slots that a function reads.
 struct Reads {
     /// Its own slots.
     own: Vec<Slot>,
-    /// Whether it reads nothing of the state.
+    /// True if it reads nothing of the state.
     is_closed: bool,
-    /// Whether what it reads of the state depends on no choice.
+    /// True if what it reads of the state depends on no choice.
     is_settled: bool,
 }
 
 impl Lowerer<'_> {
     /// Lowers an expression of an inference block.
-    pub fn formula(&mut self, e: &Expr, around: &Around) -> Formula {
+    pub fn formula(&mut self, e: &Expr, around: &PlanScope) -> Formula {
         let block = BlockId::new(self.code.blocks.len());
         let kind = BlockKind::Function { name: Arc::from("infer"), params: [].into(), required: 0 };
         self.code.blocks.push(Block::new(kind, Some(BlockId::ROOT)));
@@ -94,7 +94,7 @@ impl Lowerer<'_> {
         FormulaKind::Function { block, given: kept.into(), is_closed, is_settled }
     }
 
-    /// What a function and the blocks inside of it read.
+    /// Returns the slots that a function and the blocks inside of it read.
     fn reads(&self, function: BlockId) -> Reads {
         let mut reads = Reads { own: Vec::new(), is_closed: true, is_settled: true };
         let mut settled = FxHashSet::default();
@@ -130,7 +130,7 @@ impl Lowerer<'_> {
         reads
     }
 
-    /// Whether a value of the top level is computed without choices and without calls of
+    /// True if a value of the top level is computed without choices and without calls of
     /// functions of the program. `known` are some that are.
     fn is_settled(&self, slot: Slot, known: &mut FxHashSet<Slot>) -> bool {
         if known.contains(&slot) {

@@ -85,7 +85,7 @@ impl Graph {
         self.finish_child(code, n)
     }
 
-    /// Whether an evaluated condition holds.
+    /// True if an evaluated condition holds.
     fn holds(&self, code: &Code, n: NodeId, cond: Operand) -> Result<bool, Failure> {
         match self.value(code, self.store[n].frame, cond) {
             Value::Bool(b) => Ok(*b),
@@ -194,24 +194,55 @@ impl Graph {
 
     /// Takes the value of a call or branch from its child frame.
     fn finish_child(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let Some(Side::Child(child)) = self.store[n].side.as_deref() else {
-            return Ok(self.finish(code, n, Value::Unit));
-        };
-        let child = *child;
-        let Some(result) = code.blocks[self.store[child.frame].block].result else {
-            return Ok(self.finish(code, n, Value::Unit));
-        };
-        if let Some(m) = self.unready(child.frame, result) {
+        match self.store[n].side.as_deref() {
+            Some(Side::Child(Child { frame, .. })) => self.take_result(code, n, *frame),
+            _ => Ok(self.finish(code, n, Value::Unit)),
+        }
+    }
+
+    /// Takes the value of a node from the result of a frame.
+    pub(super) fn take_result(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        from: FrameId,
+    ) -> Result<Poll, Failure> {
+        match code.blocks[self.store[from].block].result {
+            Some(result) => self.take_operand(code, n, from, result),
+            None => Ok(self.finish(code, n, Value::Unit)),
+        }
+    }
+
+    /// Takes the value of a node from an operand of a frame, which it holds as its result.
+    pub(super) fn take_operand(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        from: FrameId,
+        operand: Operand,
+    ) -> Result<Poll, Failure> {
+        if let Some(m) = self.unready(from, operand) {
             return self.need(code, m);
         }
-        let value = self.value(code, child.frame, result).clone();
-        let node = self.resolve(child.frame, result).unwrap_or(NodeId::NONE);
-        if child.result != node {
-            if self.store[n].flags & HELD != 0 {
-                let outside = !self.is_owned_result(code, node, n);
-                self.acquire(node, n, outside);
+        let value = self.value(code, from, operand).clone();
+        let new = self.resolve(from, operand).unwrap_or(NodeId::NONE);
+        let Node { side, flags, .. } = &mut self.store[n];
+        if let Some(old) = side.as_deref_mut().and_then(Side::result).map(|r| *r)
+            && old != new
+        {
+            let mut side = side.as_deref().cloned();
+            if *flags & HELD != 0 {
+                if new != NodeId::NONE {
+                    let owned =
+                        matches!(side, Some(Side::Child(_))) && self.is_owned_result(code, new, n);
+                    self.acquire(new, n, !owned);
+                }
+                if old != NodeId::NONE {
+                    self.release(old, true);
+                }
             }
-            self.set_side(n, Some(Side::Child(Child { result: node, ..child })));
+            side.as_mut().and_then(Side::result).into_iter().for_each(|r| *r = new);
+            self.set_side(n, side);
         }
         Ok(self.finish(code, n, value))
     }
@@ -345,30 +376,17 @@ impl Graph {
     }
 
     fn finish_memo(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let Some(Side::MemoCall(call)) = self.store[n].side.as_deref() else {
+        let side = |n: NodeId| self.store[n].side.as_deref();
+        let Some(Side::MemoCall(call)) = side(n) else {
             return Ok(self.finish(code, n, Value::Unit));
         };
-        let call = call.clone();
-        let entry = match self.store[call.memo].side.as_deref() {
-            Some(Side::Memo(m)) => m.entries.get(&call.key).map(|e| e.0),
-            _ => None,
-        };
-        let Some(entry) = entry else { return Ok(self.finish(code, n, Value::Unit)) };
-        let Some(result) = code.blocks[self.store[entry].block].result else {
-            return Ok(self.finish(code, n, Value::Unit));
-        };
-        if let Some(m) = self.unready(entry, result) {
-            return self.need(code, m);
-        }
-        let value = self.value(code, entry, result).clone();
-        let node = self.resolve(entry, result).unwrap_or(NodeId::NONE);
-        if call.result != node {
-            if self.store[n].flags & HELD != 0 {
-                self.acquire(node, n, true);
+        match side(call.memo) {
+            Some(Side::Memo(m)) if m.entries.contains_key(&call.key) => {
+                let entry = m.entries[&call.key].0;
+                self.take_result(code, n, entry)
             }
-            self.set_side(n, Some(Side::MemoCall(MemoCall { result: node, ..call })));
+            _ => Ok(self.finish(code, n, Value::Unit)),
         }
-        Ok(self.finish(code, n, value))
     }
 
     /// Adds a call to an entry, which is created if it is new.

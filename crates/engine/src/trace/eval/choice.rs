@@ -73,7 +73,7 @@ impl Graph {
         self.fail(code, n, FaultKind::Type, message, Some(hint.into()))
     }
 
-    /// Whether one of these operands changed in this update.
+    /// True if one of these operands changed in this update.
     fn any_changed(&self, frame: FrameId, operands: &[Operand]) -> bool {
         let changed = |o: &Operand| {
             self.resolve(frame, *o).is_some_and(|d| self.store[d].changed == self.update.epoch)
@@ -109,63 +109,53 @@ impl Graph {
     ) -> Result<Value, Failure> {
         self.update.appeared += 1;
         self.set_improper(n, dist);
-        if let Some(count) = dist.elements() {
-            let mut stored = Vec::with_capacity(count);
-            let mut scores = Vec::with_capacity(count);
-            let whole = self.update.constraints.get(&hash).and_then(|c| c.whole(dist));
-            for i in 0..count {
-                let at = element_hash(hash, i);
-                let one = dist.element(i);
-                let given = whole.as_ref().and_then(|w| element(w, i));
-                let given =
-                    given.or_else(|| self.update.constraints.get(&at).and_then(|c| c.whole(&one)));
-                let x = match &given {
-                    Some(x) => x.clone(),
-                    None => self.drawn_now(code, n, &one, at)?,
-                };
-                let score = one.log_density_stored(&x);
-                self.score.add_prior(score, given.is_none());
-                scores.push(score);
-                stored.push(Value::from_datum(&x));
-            }
-            let side = ChoiceSide {
-                stored: None,
-                scores,
-                elements: count as u32,
-                hash: own,
-                deps: Deps::new(),
-            };
-            self.set_side(n, Some(Side::Choice(side)));
-            let own = (&self.store, &mut self.update);
-            self.choices.register(own, code, n, hash, Some(count), dist);
-            return Ok(Value::from_elements(stored));
-        }
         let given = self.update.constraints.get(&hash).and_then(|c| c.whole(dist));
-        let stored = match &given {
-            Some(x) => x.clone(),
-            None => self.drawn_now(code, n, dist, hash)?,
+        let elements = dist.elements();
+        let mut side = ChoiceSide { hash: own, ..ChoiceSide::default() };
+        let value = match elements {
+            Some(count) => {
+                let mut values = Vec::with_capacity(count);
+                side.elements = count as u32;
+                for i in 0..count {
+                    let given = given.as_ref().and_then(|w| element(w, i));
+                    let (one, at) = (dist.element(i), element_hash(hash, i));
+                    let (x, score) = self.draw_one(code, n, &one, at, given)?;
+                    side.scores.push(score);
+                    values.push(Value::from_datum(&x));
+                }
+                Value::from_elements(values)
+            }
+            None => {
+                let (x, score) = self.draw_one(code, n, dist, hash, given)?;
+                self.store[n].score = score;
+                let value = shown(dist, &x);
+                side.stored = dist.is_stored_whitened().then_some(x);
+                value
+            }
         };
-        let score = dist.log_density_stored(&stored);
-        self.score.add_prior(score, given.is_none());
-        self.store[n].score = score;
-        let whitened = dist.is_stored_whitened();
-        let value = Value::from_datum(&if whitened {
-            dist.from_noncentred(&stored)
-        } else {
-            stored.clone()
-        });
-        if whitened || own.is_some() {
-            let side = ChoiceSide {
-                stored: whitened.then_some(stored),
-                scores: Vec::new(),
-                elements: NONE,
-                hash: own,
-                deps: Deps::new(),
-            };
+        if elements.is_some() || own.is_some() || side.stored.is_some() {
             self.set_side(n, Some(Side::Choice(side)));
         }
-        self.choices.register((&self.store, &mut self.update), code, n, hash, None, dist);
+        self.choices.register((&self.store, &mut self.update), code, n, hash, elements, dist);
         Ok(value)
+    }
+
+    /// Gives a choice or an element of one its first value, and scores it.
+    fn draw_one(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        dist: &Dist,
+        hash: u64,
+        given: Option<Datum>,
+    ) -> Result<(Datum, f64), Failure> {
+        let given =
+            given.or_else(|| self.update.constraints.get(&hash).and_then(|c| c.whole(dist)));
+        let is_drawn = given.is_none();
+        let x = given.map_or_else(|| self.drawn_now(code, n, dist, hash), Ok)?;
+        let score = dist.log_density_stored(&x);
+        self.score.add_prior(score, is_drawn);
+        Ok((x, score))
     }
 
     /// Draws from the prior, or in a first run where that is asked for uniformly.
@@ -234,46 +224,24 @@ impl Graph {
             change =
                 self.update.pending_of(n).find(|p| p.element == NONE).map(|p| p.change.clone());
         }
-        let (new, from_prior) = match change {
-            None => (None, false),
-            Some(Change::Set(d)) => (Some(d), false),
-            Some(Change::Value(d)) => match dist.to_noncentred(&d) {
-                Some(x) => (Some(x), false),
+        let new = match &change {
+            None => None,
+            Some(change) => match self.changed(code, n, dist, change, None)? {
+                None if matches!(change, Change::White(_)) => {
+                    return Err(self.not_gaussian(code, n));
+                }
                 None => {
-                    return Err(self.type_error(
-                        code,
-                        n,
-                        "the value does not fit the choice".into(),
-                    ));
+                    let message = "the value does not fit the choice".into();
+                    return Err(self.type_error(code, n, message));
                 }
+                new => new,
             },
-            Some(Change::Resample) => {
-                let hash = self.choice_hash(code, n);
-                (Some(self.drawn_now(code, n, dist, hash)?), true)
-            }
-            Some(Change::Free(y)) => {
-                let support = dist.stored_support();
-                if support.free_dim() != y.len() {
-                    let message = "the choice changed its dimension".to_owned();
-                    return Err(self.fail(code, n, FaultKind::Domain, message, None));
-                }
-                let (x, jacobian) = support.from_free(&y);
-                self.score.jacobian.add(jacobian);
-                (Some(x), false)
-            }
-            Some(Change::White(z)) => {
-                let coloured = if whitened { Some(Datum::Vec(z.into())) } else { dist.colour(&z) };
-                match coloured {
-                    Some(x) => (Some(x), true),
-                    None => return Err(self.not_gaussian(code, n)),
-                }
-            }
         };
         let stored = new.as_ref().unwrap_or(&old);
         let score = dist.log_density_stored(stored);
         self.score.prior.sub(old_score);
         self.score.prior.add(score);
-        if from_prior {
+        if change.is_some_and(|c| c.is_from_prior()) {
             self.score.undrawn.add(old_score);
             self.score.drawn.add(score);
             self.update.redrawn.push((n, NONE));
@@ -281,17 +249,7 @@ impl Graph {
         self.store[n].score = score;
         self.store[n].flags &= !TARGET;
         if new.is_some() || whitened {
-            let value = Value::from_datum(&if whitened {
-                dist.from_noncentred(stored)
-            } else {
-                stored.clone()
-            });
-            let epoch = self.update.epoch;
-            let node = &mut self.store[n];
-            if !value.same(&node.value) {
-                node.value = value;
-                node.changed = epoch;
-            }
+            self.put_value(n, shown(dist, stored));
         }
         if let (Some(new), true) = (new, whitened)
             && let Some(Side::Choice(c)) = self.store[n].side.as_deref_mut()
@@ -318,37 +276,22 @@ impl Graph {
         } else {
             SmallVec::new()
         };
-        let mut changed = false;
         for (element, change) in &changes {
             let range =
                 if *element == NONE { 0..count } else { *element as usize..*element as usize + 1 };
             for i in range {
-                let one = dist.element(i);
-                let new = match change {
-                    Change::Set(d) | Change::Value(d) if *element == NONE => self::element(d, i),
-                    Change::Set(d) => Some(d.clone()),
-                    Change::Value(d) => one.to_noncentred(d),
-                    Change::Free(y) => {
-                        let (x, jacobian) = one.stored_support().from_free(y);
-                        self.score.jacobian.add(jacobian);
-                        Some(x)
-                    }
-                    Change::Resample => {
-                        Some(self.drawn_now(code, n, &one, element_hash(hash, i))?)
-                    }
-                    Change::White(z) if *element == NONE => {
-                        z.get(i).and_then(|z| one.colour(&[*z]))
-                    }
-                    Change::White(z) => one.colour(z),
-                };
+                let (one, at) = (dist.element(i), element_hash(hash, i));
+                let change =
+                    if *element == NONE { change.of_element(i) } else { Some(change.clone()) };
+                let Some(change) = change else { continue };
+                let new = self.changed(code, n, &one, &change, Some(at))?;
                 if let (Some(new), Some(x)) = (new, xs.get_mut(i)) {
-                    if matches!(change, Change::Resample | Change::White(_)) {
+                    if change.is_from_prior() {
                         self.score.undrawn.add(side.scores[i]);
                         self.score.drawn.add(one.log_density_stored(&new));
                         self.update.redrawn.push((n, i as u32));
                     }
                     *x = new;
-                    changed = true;
                 }
             }
         }
@@ -360,17 +303,52 @@ impl Graph {
         if let Some(Side::Choice(c)) = self.store[n].side.as_deref_mut() {
             c.scores = scores;
         }
-        let epoch = self.update.epoch;
-        let node = &mut self.store[n];
-        node.flags &= !TARGET;
-        if changed {
-            let value = Value::from_elements(xs.iter().map(Value::from_datum).collect());
-            if !value.same(&node.value) {
-                node.value = value;
-                node.changed = epoch;
-            }
+        self.store[n].flags &= !TARGET;
+        if !changes.is_empty() {
+            self.put_value(n, Value::from_elements(xs.iter().map(Value::from_datum).collect()));
         }
         Ok(())
+    }
+
+    /// Returns the stored form that a choice or an element of one gets by a change; `None` if
+    /// the change does not fit it.
+    fn changed(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+        dist: &Dist,
+        change: &Change,
+        hash: Option<u64>,
+    ) -> Result<Option<Datum>, Failure> {
+        Ok(match change {
+            Change::Set(d) => Some(d.clone()),
+            Change::Value(d) => dist.to_noncentred(d),
+            Change::Resample => {
+                let hash = hash.unwrap_or_else(|| self.choice_hash(code, n));
+                Some(self.drawn_now(code, n, dist, hash)?)
+            }
+            Change::Free(y) => {
+                let support = dist.stored_support();
+                if support.free_dim() != y.len() {
+                    let message = "the choice changed its dimension".to_owned();
+                    return Err(self.fail(code, n, FaultKind::Domain, message, None));
+                }
+                let (x, jacobian) = support.from_free(y);
+                self.score.jacobian.add(jacobian);
+                Some(x)
+            }
+            Change::White(z) if dist.is_stored_whitened() => Some(Datum::Vec(z.clone().into())),
+            Change::White(z) => dist.colour(z),
+        })
+    }
+
+    /// Gives a node a value, which may be the one that it has.
+    fn put_value(&mut self, n: NodeId, value: Value) {
+        let node = &mut self.store[n];
+        if !value.same(&node.value) {
+            node.value = value;
+            node.changed = self.update.epoch;
+        }
     }
 
     /// Removes a choice that nothing depends on from the score and the register.
@@ -420,6 +398,30 @@ impl Graph {
             message,
             Some("elliptical moves need normal, mv_normal or gp".into()),
         )
+    }
+}
+
+/// Returns the value of a choice in this stored form.
+fn shown(dist: &Dist, stored: &Datum) -> Value {
+    match dist.is_stored_whitened() {
+        true => Value::from_datum(&dist.from_noncentred(stored)),
+        false => Value::from_datum(stored),
+    }
+}
+
+impl Change {
+    /// True if the new value is one of the prior.
+    fn is_from_prior(&self) -> bool {
+        matches!(self, Change::Resample | Change::White(_))
+    }
+
+    /// Returns what a change of a whole choice is for its element `i`.
+    fn of_element(&self, i: usize) -> Option<Change> {
+        Some(match self {
+            Change::Set(d) | Change::Value(d) => Change::Set(element(d, i)?),
+            Change::White(z) => Change::White(vec![*z.get(i)?]),
+            change => change.clone(),
+        })
     }
 }
 

@@ -1,6 +1,6 @@
 //! Keyed containers, indexing, and reading a container as a whole.
 
-use crate::lang::code::{Code, Op, Operand, Source, SourceKey};
+use crate::lang::code::{Code, ElementDraw, ElementKey, Op, Operand};
 use crate::lang::error::FaultKind;
 use crate::lang::key::Key;
 use crate::lang::value::Value;
@@ -30,12 +30,12 @@ impl Graph {
         &mut self,
         code: &Code,
         n: NodeId,
-        sources: &[Source],
+        sources: &[ElementDraw],
     ) -> Result<Poll, Failure> {
         let frame = self.store[n].frame;
         let mut deps = Deps::new();
-        let entries = if let [Source { loops, keys, .. }] = sources
-            && let ([slot], [SourceKey::Loop(0)]) = (&loops[..], &keys[..])
+        let entries = if let [ElementDraw { loops, keys, .. }] = sources
+            && let ([slot], [ElementKey::Loop(0)]) = (&loops[..], &keys[..])
         {
             let outer = self.store[frame].base + *slot;
             if self.store[outer].state != State::Clean {
@@ -84,7 +84,7 @@ impl Graph {
         code: &Code,
         n: NodeId,
         frame: FrameId,
-        source: &Source,
+        source: &ElementDraw,
         index: u32,
         passes: &mut SmallVec<[u32; 2]>,
         deps: &mut Deps,
@@ -114,7 +114,7 @@ impl Graph {
         let mut keys: SmallVec<[Key; 1]> = SmallVec::new();
         for k in &source.keys {
             let key = match k {
-                SourceKey::Loop(level) => {
+                ElementKey::Loop(level) => {
                     let mut f = frame;
                     for _ in *level as usize + 1..source.loops.len() {
                         f = self.store[self.store[f].owner].frame;
@@ -124,7 +124,7 @@ impl Graph {
                         self.type_error(code, n, "this iteration of the loop has no key".into())
                     })?
                 }
-                SourceKey::Operand(o) => {
+                ElementKey::Operand(o) => {
                     if let Some(m) = self.unready(frame, *o) {
                         return self.need(code, m).map(Some);
                     }

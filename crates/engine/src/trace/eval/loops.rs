@@ -86,7 +86,7 @@ impl Graph {
         if self.slot_facts(code, n).is_effect {
             self.make_all_passes(code, n)?;
         }
-        Ok(self.finish_structure(code, n))
+        Ok(self.finish_unchanged(code, n))
     }
 
     pub(super) fn evaluate_map(
@@ -95,7 +95,6 @@ impl Graph {
         n: NodeId,
         f: Operand,
         over: Operand,
-        _site: SiteId,
     ) -> Result<Poll, Failure> {
         let frame = self.store[n].frame;
         if let Some(step) = self.await_all(code, frame, &[f])? {
@@ -143,7 +142,7 @@ impl Graph {
         if self.slot_facts(code, n).is_effect {
             self.make_all_passes(code, n)?;
         }
-        Ok(self.finish_structure(code, n))
+        Ok(self.finish_unchanged(code, n))
     }
 
     pub(super) fn evaluate_fold(
@@ -153,7 +152,6 @@ impl Graph {
         f: Operand,
         init: Operand,
         over: Operand,
-        _site: SiteId,
     ) -> Result<Poll, Failure> {
         let frame = self.store[n].frame;
         if let Some(step) = self.await_all(code, frame, &[f])? {
@@ -181,38 +179,13 @@ impl Graph {
             Some(Side::Loop(l)) => l.frames.len(),
             _ => 0,
         };
-        let (from, operand) = match passes.checked_sub(1) {
-            None => (frame, Some(init)),
-            Some(last) => {
-                // All passes must exist, so that a change propagates from each to the
-                // next.
-                self.make_all_passes(code, n)?;
-                let f = self.pass_frame(code, n, last)?;
-                (f, code.blocks[self.store[f].block].result)
-            }
+        let Some(last) = passes.checked_sub(1) else {
+            return self.take_operand(code, n, frame, init);
         };
-        let Some(operand) = operand else { return Ok(self.finish(code, n, Value::Unit)) };
-        if let Some(m) = self.unready(from, operand) {
-            return self.need(code, m);
-        }
-        let value = self.value(code, from, operand).clone();
-        let result = self.resolve(from, operand).unwrap_or(NodeId::NONE);
-        if let Some(Side::Loop(l)) = self.store[n].side.as_deref()
-            && l.result != result
-        {
-            let mut l = l.clone();
-            if self.store[n].flags & HELD != 0 {
-                if result != NodeId::NONE {
-                    self.acquire(result, n, true);
-                }
-                if l.result != NodeId::NONE {
-                    self.release(l.result, true);
-                }
-            }
-            l.result = result;
-            self.set_side(n, Some(Side::Loop(l)));
-        }
-        Ok(self.finish(code, n, value))
+        // All passes must exist, so that a change propagates from each to the next.
+        self.make_all_passes(code, n)?;
+        let last = self.pass_frame(code, n, last)?;
+        self.take_result(code, n, last)
     }
 
     fn check_callback(
@@ -307,11 +280,6 @@ impl Graph {
             node.changed = self.update.epoch;
         }
         Ok(())
-    }
-
-    /// Ends the evaluation of a node whose value is a reference to its structure.
-    fn finish_structure(&mut self, code: &Code, n: NodeId) -> Poll {
-        self.finish_unchanged(code, n)
     }
 
     fn make_all_passes(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {

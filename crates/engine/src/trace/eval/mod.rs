@@ -69,10 +69,8 @@ impl Graph {
                 self.evaluate_select(code, n, *cond, *then, *otherwise)
             }
             Op::For { iter, body } => self.evaluate_for(code, n, *iter, *body),
-            Op::Map { f, over, site } => self.evaluate_map(code, n, *f, *over, *site),
-            Op::Fold { f, init, over, site } => {
-                self.evaluate_fold(code, n, *f, *init, *over, *site)
-            }
+            Op::Map { f, over, .. } => self.evaluate_map(code, n, *f, *over),
+            Op::Fold { f, init, over, .. } => self.evaluate_fold(code, n, *f, *init, *over),
             Op::Container { sources, .. } => self.evaluate_container(code, n, sources),
             Op::Gather => self.evaluate_gather(code, n),
             Op::Mem { f, .. } => self.evaluate_mem(code, n, *f),

@@ -24,7 +24,7 @@ pub(in crate::trace) type Given = SmallVec<[(u32, u32); 2]>;
 #[derive(Debug, Default)]
 pub(in crate::trace) struct InPlace {
     values: Vec<(Given, NodeId, Form)>,
-    /// What else of a node moves.
+    /// The other parts of nodes that move.
     besides: Vec<(Given, NodeId, Besides)>,
     /// Nodes that contribute to the score, and where their terms are on the tape.
     scores: Vec<(Given, NodeId, Scored)>,
@@ -61,14 +61,14 @@ impl OneNumber {
         }
     }
 
-    /// Whether the choice has this value.
+    /// True if the choice has this value.
     #[inline]
     fn applies(&self, values: &[usize]) -> bool {
         self.choice == NONE || values.get(self.choice as usize) == Some(&(self.value as usize))
     }
 }
 
-/// What a node keeps besides its value, and where that is on a tape.
+/// A thing that a node keeps besides its value, and its place on a tape.
 #[derive(Clone, Debug)]
 pub(in crate::trace) enum Besides {
     /// The last evaluation of an incremental function.
@@ -142,7 +142,7 @@ impl InPlace {
         self
     }
 
-    /// Whether [`InPlace::apply`] can move the trace to the point of the tape's last run,
+    /// True if [`InPlace::apply`] can move the trace to the point of the tape's last run,
     /// with choices that are summed out at these values.
     pub fn fits(&mut self, graph: &Graph, code: &Code, tape: &Tape, values: &[usize]) -> bool {
         self.made.clear();
@@ -305,7 +305,7 @@ impl InPlace {
     }
 }
 
-/// Whether a node with this operation and side can take a score that is one term.
+/// True if a node with this operation and side can take a score that is one term.
 fn takes_one(op: &Op, side: Option<&Side>) -> bool {
     match (op, side) {
         (Op::Draw { .. }, Some(Side::Choice(c))) => c.elements == NONE,
@@ -315,7 +315,7 @@ fn takes_one(op: &Op, side: Option<&Side>) -> bool {
     }
 }
 
-/// Whether a node exists, and depends on choices that are summed out through these values.
+/// True if a node exists, and depends on choices that are summed out through these values.
 fn holds(graph: &Graph, given: &Given, n: NodeId, values: &[usize]) -> bool {
     let same = |(x, value): &(u32, u32)| values.get(*x as usize) == Some(&(*value as usize));
     given.iter().all(same) && graph.store[n].state == State::Clean
@@ -334,7 +334,7 @@ fn put(value: &mut Value, xs: &[f64]) {
 }
 
 impl Trace {
-    /// Whether every node of a trace of the same history is the same to the last bit; else
+    /// True if every node of a trace of the same history is the same to the last bit; else
     /// says how one differs.
     pub fn same_nodes(&self, other: &Trace) -> Result<(), String> {
         let (mine, theirs) = (&self.graph, &other.graph);

@@ -34,7 +34,7 @@ use smallvec::SmallVec;
 /// Nodes that a value is computed from.
 type Inputs = SmallVec<[NodeId; 8]>;
 
-/// Whether a node's value depends on a target of the gradient.
+/// True if a node's value depends on a target of the gradient.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Mark {
     Unseen,
@@ -189,7 +189,7 @@ fn flatten(by: &Adjoint, n: usize, out: &mut Vec<f64>) {
 }
 
 impl<'a> Reverse<'a> {
-    /// Whether a node's value depends on a target; if so, it is appended to the order.
+    /// True if a node's value depends on a target; if so, it is appended to the order.
     fn visit(&mut self, root: NodeId) -> bool {
         // A node, its inputs, how many of them are done, and whether it is active so far.
         let mut stack: Vec<(NodeId, Inputs, usize, bool)> = Vec::new();

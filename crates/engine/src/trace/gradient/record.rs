@@ -123,7 +123,7 @@ impl Graph {
     }
 }
 
-/// What has been recorded so far.
+/// The part recorded so far.
 pub(in crate::trace) struct Recorded {
     /// The choices that move: their values, or the noise that is stored.
     placed: FxHashMap<NodeId, Form>,
@@ -153,13 +153,13 @@ pub(in crate::trace) struct Recorder<'a> {
     view: Reverse<'a>,
     reached: FxHashSet<NodeId>,
     pub recorded: Recorded,
-    /// Whether scores are recorded with the nodes that have them.
+    /// True if scores are recorded with the nodes that have them.
     scores: bool,
     /// The nodes whose inputs move.
     moving: Vec<NodeId>,
     /// Where the scores are that have been recorded.
     scored: Vec<(NodeId, Scored)>,
-    /// What else of a node moves than its value.
+    /// The parts of nodes that move, besides values.
     besides: FxHashMap<NodeId, Besides>,
 }
 
@@ -534,7 +534,7 @@ impl Recorder<'_> {
     }
 }
 
-/// Whether a distribution whose parameters move has a fixed support.
+/// True if a distribution whose parameters move has a fixed support.
 fn has_fixed_support(dist: &Dist, params: &[Form]) -> bool {
     match dist {
         d if !d.has_moving_support() => true,

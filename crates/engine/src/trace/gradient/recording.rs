@@ -119,7 +119,7 @@ impl Recording {
         true
     }
 
-    /// Whether it is valid for the current state of a trace.
+    /// True if it is valid for the current state of a trace.
     pub fn holds(&self, trace: &Trace) -> bool {
         self.revision == trace.graph.revision && Arc::ptr_eq(&self.identity, &trace.identity)
     }

@@ -16,7 +16,7 @@ use crate::lang::key::Key;
 use pcadlang_numerics::dist::Datum;
 use rustc_hash::FxHashMap;
 
-/// What exists only during one update.
+/// The state of one update.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Update {
     journal: Vec<Entry>,

@@ -238,23 +238,13 @@ impl Graph {
 
     /// Replaces the nodes that a node holds besides its operands.
     pub fn set_deps(&mut self, n: NodeId, deps: Deps) {
-        if deps.is_empty() && self.store[n].side.is_none() {
-            return;
+        match self.store[n].side.as_deref() {
+            None if deps.is_empty() => return,
+            Some(Side::Kept(_)) | None => {}
+            Some(side) if side.deps() == deps.as_slice() => return,
+            Some(_) => {}
         }
-        let held = self.store[n].flags & HELD != 0;
-        let old = match self.store[n].side.as_deref() {
-            Some(Side::Deps(old) | Side::Kept(Kept { deps: old, .. })) => old.clone(),
-            Some(Side::Choice(c)) => c.deps.clone(),
-            Some(Side::Total(t)) => t.deps.clone(),
-            _ => Deps::new(),
-        };
-        if old == deps && !matches!(self.store[n].side.as_deref(), Some(Side::Kept(_))) {
-            return;
-        }
-        if held {
-            deps.iter().for_each(|d| self.acquire(*d, n, true));
-            old.iter().for_each(|d| self.release(*d, true));
-        }
+        self.hold_instead(n, &deps);
         match self.store[n].side.as_deref_mut() {
             Some(Side::Choice(c)) => {
                 self.update.note(Entry::Choice(n, Box::new(c.clone())));
@@ -271,15 +261,20 @@ impl Graph {
     /// Stores the evaluation of an incremental function, and the nodes held besides the
     /// operands.
     pub fn keep(&mut self, n: NodeId, deps: Deps, before: PreviousEvaluation) {
-        let old = match self.store[n].side.as_deref() {
-            Some(Side::Deps(old) | Side::Kept(Kept { deps: old, .. })) => old.clone(),
-            _ => Deps::new(),
-        };
-        if self.store[n].flags & HELD != 0 && old != deps {
+        if self.store[n].side.as_deref().map_or(&[][..], Side::deps) != deps.as_slice() {
+            self.hold_instead(n, &deps);
+        }
+        self.set_side(n, Some(Side::Kept(Kept { deps, before: Arc::new(before) })));
+    }
+
+    /// Acquires what a node will hold besides its operands, and releases what it held.
+    fn hold_instead(&mut self, n: NodeId, deps: &[NodeId]) {
+        if self.store[n].flags & HELD != 0 {
+            let side = self.store[n].side.as_deref();
+            let old: Deps = side.map_or(&[][..], Side::deps).into();
             deps.iter().for_each(|d| self.acquire(*d, n, true));
             old.iter().for_each(|d| self.release(*d, true));
         }
-        self.set_side(n, Some(Side::Kept(Kept { deps, before: Arc::new(before) })));
     }
 
     /// Makes one attempt to evaluate a node.

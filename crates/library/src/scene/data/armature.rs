@@ -1,6 +1,6 @@
 //! Armatures: a rig file and what it names, or a glTF file with a skin.
 
-use super::Beside;
+use super::SiblingFiles;
 use crate::scene::ArmatureValue;
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::geom::armature::{Armature, morphs_from_json, rig_from_json};
@@ -13,7 +13,7 @@ pub(super) fn load(
     file: &str,
     bytes: &[u8],
     frame: &FileFrame,
-    beside: &Beside,
+    beside: &SiblingFiles,
 ) -> Result<Value, String> {
     let plain = |e: GeomError| e.to_string();
     if gltf::is_gltf(file, bytes) {

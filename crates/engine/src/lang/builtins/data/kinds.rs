@@ -1,6 +1,6 @@
 //! The kinds of data that a table has.
 
-use super::format::{Beside, Literal, Options};
+use super::format::{Literal, Options, SiblingFiles};
 use crate::lang::builtins::{Builtin, Table};
 use crate::lang::fault::Fault;
 use crate::lang::value::Value;
@@ -36,7 +36,7 @@ impl Table {
         file: &str,
         bytes: &[u8],
         options: &Options,
-        beside: &Beside,
+        beside: &SiblingFiles,
     ) -> Result<Value, Fault> {
         match self.kind(kind).and_then(|b| b.format.as_ref()) {
             Some(format) => format.load(file, bytes, options, beside),
@@ -77,7 +77,7 @@ impl Table {
         Ok(options)
     }
 
-    /// Whether data of a kind have options.
+    /// True if data of a kind have options.
     pub fn has_options(&self, kind: &str) -> bool {
         self.kind(kind).is_some_and(has_options)
     }
