@@ -12,7 +12,6 @@ use super::select::Selector;
 use super::store::Store;
 use super::terms::{pop_key, push_key};
 use super::update::{Failure, Update};
-use crate::lang::code::Code;
 use crate::lang::error::FaultKind;
 use pcadlang_numerics::dist::Dist;
 use rustc_hash::FxHashMap;
@@ -148,13 +147,12 @@ impl Choices {
     }
 
     /// Registers a selection, or returns the one already registered for this selector.
-    pub fn selection(&mut self, store: &Store, code: &Code, selector: &Selector) -> Selection {
+    pub fn selection(&mut self, store: &Store, selector: &Selector) -> Selection {
         if let Some(i) = self.selections.iter().position(|m| m.selector == *selector) {
             return Selection(i as u32);
         }
         let all = self.selections[0].listed.clone();
-        let listed =
-            all.0.iter().zip(all.1.iter()).filter(|(_, t)| store.selects(code, selector, t));
+        let listed = all.0.iter().zip(all.1.iter()).filter(|(_, t)| store.selects(selector, t));
         let (hashes, targets) = listed.map(|(hash, t)| (*hash, *t)).unzip();
         let members = Members::new(selector.clone(), hashes, targets);
         self.selections.push(members);
@@ -165,7 +163,6 @@ impl Choices {
     pub fn register(
         &mut self,
         (store, update): (&Store, &mut Update),
-        code: &Code,
         n: NodeId,
         hash: u64,
         elements: Option<usize>,
@@ -180,7 +177,7 @@ impl Choices {
         update.note(Entry::ChoiceAdded(n, hash));
         let needs_facts = self.selections.len() > 1;
         let needs_address = self.selections.iter().any(|m| m.selector.needs_address());
-        let mut facts = needs_facts.then(|| store.facts(code, n, needs_address, Some(dist)));
+        let mut facts = needs_facts.then(|| store.facts(n, needs_address, Some(dist)));
         for i in 0..self.selections.len() {
             for e in 0..elements.unwrap_or(1) {
                 let element = if elements.is_some() { e as u32 } else { NONE };
@@ -218,29 +215,23 @@ impl Choices {
 
     /// Ends an update: updates the members of selections, and fails at the second of two
     /// choices with the same address.
-    pub fn update_selections(
-        &mut self,
-        store: &Store,
-        update: &mut Update,
-        code: &Code,
-    ) -> Result<(), Failure> {
+    pub fn update_selections(&mut self, store: &Store, update: &mut Update) -> Result<(), Failure> {
         for i in 0..self.selections.len() {
             if let Some(before) = self.selections[i].apply() {
                 update.note(Entry::TargetsReplaced { selection: i as u32, before });
             }
         }
-        self.check_duplicates(store, code)
+        self.check_duplicates(store)
     }
 
     /// Fails if two choices have the same address, at the second of them.
-    fn check_duplicates(&mut self, store: &Store, code: &Code) -> Result<(), Failure> {
+    fn check_duplicates(&mut self, store: &Store) -> Result<(), Failure> {
         for (old, new) in std::mem::take(&mut self.suspects) {
             let alive = |n: NodeId| store[n].state != State::Empty;
             if alive(old) && alive(new) {
-                let message =
-                    format!("a second choice at the address {}", store.address(code, new));
+                let message = format!("a second choice at the address {}", store.address(new));
                 let hint = Some("give each choice its own name or key".to_owned());
-                return Err(store.fail(code, new, FaultKind::Duplicate, message, hint));
+                return Err(store.fail(new, FaultKind::Duplicate, message, hint));
             }
         }
         Ok(())

@@ -7,7 +7,7 @@
 use super::node::*;
 use super::store::Store;
 use super::{Address, Target, Trace};
-use crate::lang::code::{Callee, Code, Op, Operand};
+use crate::lang::code::{Callee, Op, Operand};
 use pcadlang_numerics::num::ExactSum;
 use pcadlang_syntax::span::Span;
 use rustc_hash::FxHashSet;
@@ -66,15 +66,15 @@ impl Trace {
         self.rollback();
         let before = self.graph.begin();
         self.graph.update.invalidate_target(&mut self.graph.store, &self.code, t.node);
-        let reach = self.graph.dependents_of(&self.code, t.node);
-        self.graph.rollback(&self.code, before);
+        let reach = self.graph.dependents_of(t.node);
+        self.graph.rollback(before);
         reach
     }
 
     /// Returns the choices that a choice's distribution depends on and those that decide
     /// whether it exists, by address.
     pub fn origins(&self, t: Target) -> Vec<Address> {
-        self.graph.origins(&self.code, t.node)
+        self.graph.origins(t.node)
     }
 }
 
@@ -95,10 +95,10 @@ impl Trace {
 
 impl Store {
     /// Collects the stale nodes, except the choice at which invalidation started.
-    fn dependents_of(&self, code: &Code, from: NodeId) -> Dependents {
+    fn dependents_of(&self, from: NodeId) -> Dependents {
         let mut reach = Dependents::default();
         let mut add = |n: NodeId, term, effect| {
-            let address = self.address(code, n);
+            let address = self.address(n);
             reach.terms.push(Dependent { address, term, effect, log_density: self.term_score(n) });
         };
         for (n, node) in self.nodes() {
@@ -106,20 +106,20 @@ impl Store {
             if n == from || !(is_marked || node.state == State::Clean) {
                 continue;
             }
-            let term = match self.op(code, n) {
+            let term = match self.op(n) {
                 Op::Draw { .. } => Term::Choice,
                 Op::Observe { .. } => Term::Observation,
                 Op::Factor { .. } => Term::Factor,
                 _ => {
                     reach.values += usize::from(is_marked);
-                    reach.names.extend(self.name_of(code, n).filter(|_| is_marked));
+                    reach.names.extend(self.name_of(n).filter(|_| is_marked));
                     continue;
                 }
             };
-            if self.hangs_on_marked(code, n) {
+            if self.hangs_on_marked(n) {
                 add(n, term, Effect::Structural);
             } else if is_marked {
-                let moves = term == Term::Choice && self.may_be_redrawn(code, n);
+                let moves = term == Term::Choice && self.may_be_redrawn(n);
                 add(n, term, if moves { Effect::Moved } else { Effect::Scored });
             }
         }
@@ -142,14 +142,14 @@ impl Store {
 
     /// True if a node that decides whether `n` exists is stale: the condition of a branch
     /// around it, or what a loop runs over.
-    fn hangs_on_marked(&self, code: &Code, n: NodeId) -> bool {
+    fn hangs_on_marked(&self, n: NodeId) -> bool {
         let mut deciding = Vec::new();
-        self.deciding(code, n, &mut deciding);
+        self.deciding(n, &mut deciding);
         deciding.iter().any(|d| self[*d].state == State::Stale)
     }
 
     /// Collects the nodes that decide whether `n` exists.
-    fn deciding(&self, code: &Code, n: NodeId, into: &mut Vec<NodeId>) {
+    fn deciding(&self, n: NodeId, into: &mut Vec<NodeId>) {
         let mut frame = self[n].frame;
         loop {
             let owner = self[frame].owner;
@@ -158,7 +158,7 @@ impl Store {
             }
             frame = self[owner].frame;
             let mut by = |o: Operand| into.extend(self.resolve(frame, o));
-            match self.op(code, owner) {
+            match self.op(owner) {
                 Op::If { cond, .. } => by(*cond),
                 Op::For { iter, .. } => by(*iter),
                 Op::Map { over, .. } | Op::Fold { over, .. } => by(*over),
@@ -168,19 +168,19 @@ impl Store {
         }
     }
 
-    fn origins(&self, code: &Code, n: NodeId) -> Vec<Address> {
+    fn origins(&self, n: NodeId) -> Vec<Address> {
         let mut seen = vec![false; self.len()];
         let mut open = Vec::new();
-        self.each_dep(code, n, |d, _| open.push(d));
-        self.deciding(code, n, &mut open);
+        self.each_dep(n, |d, _| open.push(d));
+        self.deciding(n, &mut open);
         let mut found = Vec::new();
         while let Some(d) = open.pop() {
             if std::mem::replace(&mut seen[d], true) {
                 continue;
             }
-            match self.op(code, d) {
-                Op::Draw { .. } if d != n => found.push(self.address(code, d)),
-                _ => self.each_dep(code, d, |e, _| open.push(e)),
+            match self.op(d) {
+                Op::Draw { .. } if d != n => found.push(self.address(d)),
+                _ => self.each_dep(d, |e, _| open.push(e)),
             }
         }
         found.sort();

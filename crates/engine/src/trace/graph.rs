@@ -16,6 +16,7 @@ use crate::lang::error::FaultKind;
 use crate::lang::value::Value;
 use smallvec::SmallVec;
 use std::ops::Deref;
+use std::sync::Arc;
 
 /// The dependency graph of one execution. It reads as its [`Store`].
 #[derive(Clone, Debug)]
@@ -42,7 +43,7 @@ impl Deref for Graph {
 
 impl Graph {
     /// Creates the graph of a program that has not run.
-    pub fn new(code: &Code, limits: Limits) -> Self {
+    pub fn new(code: Arc<Code>, limits: Limits) -> Self {
         Graph {
             store: Store::new(code),
             update: Update::default(),
@@ -72,16 +73,16 @@ impl Graph {
     }
 
     /// Commits the update.
-    pub fn commit(&mut self, code: &Code) {
+    pub fn commit(&mut self) {
         self.revision += 1;
-        self.update.commit(&mut self.store, code);
+        self.update.commit(&mut self.store);
         self.choices.forget_update();
     }
 
     /// Undoes the update.
-    pub fn rollback(&mut self, code: &Code, before: Before) {
+    pub fn rollback(&mut self, before: Before) {
         while let Some(entry) = self.update.pop_entry() {
-            entry.undo(code, &mut self.store, &mut self.choices);
+            entry.undo(&mut self.store, &mut self.choices);
         }
         self.score.rollback(before);
         self.update.forget();
@@ -89,11 +90,10 @@ impl Graph {
     }
 
     /// Creates a frame for `owner` as part of the current update, and queues its effects.
-    pub fn make_frame(&mut self, code: &Code, frame: Frame) -> Result<FrameId, Failure> {
-        let len = code.blocks[frame.block].len();
+    pub fn make_frame(&mut self, frame: Frame) -> Result<FrameId, Failure> {
+        let len = self.code.blocks[frame.block].len();
         if frame.depth > self.budget.limits.depth {
             return Err(self.fail(
-                code,
                 frame.owner,
                 FaultKind::Limit,
                 format!("calls are nested more than {} deep", self.budget.limits.depth),
@@ -102,7 +102,6 @@ impl Graph {
         }
         if self.store.len() + len > self.budget.limits.nodes as usize {
             return Err(self.fail(
-                code,
                 frame.owner,
                 FaultKind::Limit,
                 format!("the trace grew beyond {} nodes", self.budget.limits.nodes),
@@ -112,14 +111,15 @@ impl Graph {
                 )),
             ));
         }
-        self.budget.count_operation(&self.store, code, frame.owner)?;
+        self.budget.count_operation(&self.store, frame.owner)?;
         let block = frame.block;
-        let id = self.store.place_frame(code, frame);
+        let id = self.store.place_frame(frame);
         self.update.note(Entry::FrameMade(id));
         let base = self.store[id].base;
-        for s in &code.blocks[block].effects {
-            self.store[base + *s].refs = 1;
-            self.update.effects.push(base + *s);
+        for i in 0..self.code.blocks[block].effects.len() {
+            let n = base + self.code.blocks[block].effects[i];
+            self.store[n].refs = 1;
+            self.update.effects.push(n);
         }
         Ok(id)
     }
@@ -152,7 +152,7 @@ impl Graph {
     }
 
     /// Detaches a frame: its effects are released, together with what only they hold.
-    pub fn detach(&mut self, code: &Code, id: FrameId) {
+    pub fn detach(&mut self, id: FrameId) {
         let frame = &mut self.store[id];
         if !frame.attached {
             return;
@@ -161,21 +161,21 @@ impl Graph {
         let (block, base) = (frame.block, frame.base);
         self.update.note(Entry::FrameDetached(id));
         self.update.detached.push(id);
-        for s in &code.blocks[block].effects {
-            self.release(base + *s, false);
+        for i in 0..self.code.blocks[block].effects.len() {
+            self.release(base + self.code.blocks[block].effects[i], false);
         }
     }
 
     /// Empties every node that nothing holds.
-    pub fn sweep(&mut self, code: &Code) {
+    pub fn sweep(&mut self) {
         loop {
             if let Some(n) = self.update.unheld.pop() {
                 let node = &self.store[n];
                 if node.refs == 0 && node.state != State::Empty {
-                    self.retire(code, n);
+                    self.retire(n);
                 }
             } else if let Some((memo, key)) = self.update.idle.pop() {
-                self.drop_idle(code, memo, &key);
+                self.drop_idle(memo, &key);
             } else {
                 return;
             }
@@ -183,22 +183,22 @@ impl Graph {
     }
 
     /// Empties a node: removes its contribution to the score and releases what it holds.
-    fn retire(&mut self, code: &Code, n: NodeId) {
+    fn retire(&mut self, n: NodeId) {
         self.update.save(&mut self.store, n);
-        let op = self.op(code, n);
+        let op = self.op(n);
         match op {
-            Op::Draw { .. } => self.retire_choice(code, n),
+            Op::Draw { .. } => self.retire_choice(n),
             Op::Observe { .. } | Op::Factor { .. } => self.retire_score(n),
             _ => {}
         }
         if self.store[n].flags & HELD != 0 {
             let mut deps: SmallVec<[(NodeId, bool); 8]> = SmallVec::new();
-            self.each_dep(code, n, |d, outside| deps.push((d, outside)));
+            self.each_dep(n, |d, outside| deps.push((d, outside)));
             for (d, outside) in deps {
                 self.release(d, outside);
             }
         }
-        self.drop_structure(code, n);
+        self.drop_structure(n);
         let node = &mut self.store[n];
         node.state = State::Empty;
         node.flags &= SAVED;
@@ -208,27 +208,27 @@ impl Graph {
 
     /// Releases everything that a node holds besides its operands, before its form
     /// changes.
-    pub fn let_side_go(&mut self, code: &Code, n: NodeId) {
+    pub fn let_side_go(&mut self, n: NodeId) {
         if self.store[n].flags & HELD != 0 {
             let mut deps: SmallVec<[(NodeId, bool); 4]> = SmallVec::new();
-            self.each_side_dep(code, n, |d, outside| deps.push((d, outside)));
+            self.each_side_dep(n, |d, outside| deps.push((d, outside)));
             for (d, outside) in deps {
                 self.release(d, outside);
             }
         }
-        self.drop_structure(code, n);
+        self.drop_structure(n);
     }
 
     /// Releases the frames and table entries that a node owns, and its side.
-    pub fn drop_structure(&mut self, code: &Code, n: NodeId) {
+    pub fn drop_structure(&mut self, n: NodeId) {
         let Some(side) = self.swap_side(n, None) else { return };
         match &side {
-            Side::Child(c) => self.detach(code, c.frame),
+            Side::Child(c) => self.detach(c.frame),
             Side::MemoCall(c) => self.leave_memo(c.memo, &c.key),
             Side::Loop(l) => {
-                l.frames.iter().filter(|f| **f != FrameId::NONE).for_each(|f| self.detach(code, *f))
+                l.frames.iter().filter(|f| **f != FrameId::NONE).for_each(|f| self.detach(*f))
             }
-            Side::Memo(m) => m.entries.values().for_each(|(f, _)| self.detach(code, *f)),
+            Side::Memo(m) => m.entries.values().for_each(|(f, _)| self.detach(*f)),
             _ => {}
         }
         self.update.note(Entry::Side(n, Some(Box::new(side))));

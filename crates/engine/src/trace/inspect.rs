@@ -13,7 +13,7 @@ impl Trace {
     /// Registers a selection, whose members are kept up to date from then on.
     pub fn select(&mut self, selector: &Selector) -> Selection {
         self.rollback();
-        self.graph.choices.selection(&self.graph.store, &self.code, selector)
+        self.graph.choices.selection(&self.graph.store, selector)
     }
 
     /// Returns the current members of a selection.
@@ -64,7 +64,7 @@ impl Trace {
 
     /// Returns the address of a choice.
     pub fn address(&self, t: Target) -> Address {
-        let mut a = self.graph.address(&self.code, t.node);
+        let mut a = self.graph.address(t.node);
         if t.element != NONE {
             terms::push_key(&mut a, t.element);
         }
@@ -73,7 +73,7 @@ impl Trace {
 
     /// Returns a hash of the address of a choice, stable between runs.
     pub fn address_hash(&self, t: Target) -> u64 {
-        let h = self.graph.choice_hash(&self.code, t.node);
+        let h = self.graph.choice_hash(t.node);
         if t.element == NONE { h } else { eval::choice::element_hash(h, t.element as usize) }
     }
 
@@ -81,7 +81,7 @@ impl Trace {
     pub fn is_active(&self, t: Target) -> bool {
         let node = self.graph.store.get(t.node);
         node.is_some_and(|n| n.state == State::Clean)
-            && matches!(self.graph.op(&self.code, t.node), Op::Draw { .. })
+            && matches!(self.graph.op(t.node), Op::Draw { .. })
     }
 
     /// Returns the value of a choice as the program sees it.
@@ -130,7 +130,7 @@ impl Trace {
 
     /// Returns the current distribution of a choice.
     pub fn dist(&self, t: Target) -> Option<Dist> {
-        let d = self.graph.dist_of(&self.code, t.node)?;
+        let d = self.graph.dist_of(t.node)?;
         Some(if t.element == NONE { d } else { d.element(t.element as usize) })
     }
 
@@ -165,7 +165,7 @@ impl Trace {
     /// Returns every observation and factor with its log density, in the order of the
     /// program's blocks.
     pub fn observations(&self) -> Vec<(Address, f64)> {
-        self.scored().into_iter().map(|(n, s)| (self.graph.address(&self.code, n), s)).collect()
+        self.scored().into_iter().map(|(n, s)| (self.graph.address(n), s)).collect()
     }
 
     /// Returns everything with log density -∞ and its source span: observations and
@@ -173,8 +173,7 @@ impl Trace {
     pub fn impossible(&self) -> Vec<(Address, pcadlang_syntax::span::Span)> {
         let observed =
             self.scored().into_iter().filter(|(_, s)| *s == f64::NEG_INFINITY).map(|(n, _)| n);
-        let mut found: Vec<_> =
-            observed.map(|n| (self.graph.address(&self.code, n), self.span(n))).collect();
+        let mut found: Vec<_> = observed.map(|n| (self.graph.address(n), self.span(n))).collect();
         let targets = self.all_targets();
         let zero = targets.iter().filter(|t| self.score_of(**t) == f64::NEG_INFINITY);
         let mut chosen: Vec<_> = zero.map(|t| (self.address(*t), self.span(t.node))).collect();
@@ -188,9 +187,7 @@ impl Trace {
     #[doc(hidden)]
     pub fn outside_support(&self) -> Vec<(Address, String)> {
         let zero = self.scored().into_iter().filter(|(_, s)| *s == f64::NEG_INFINITY);
-        let why = |(n, _)| {
-            Some((self.graph.address(&self.code, n), self.graph.outside_support(&self.code, n)?))
-        };
+        let why = |(n, _)| Some((self.graph.address(n), self.graph.outside_support(n)?));
         zero.filter_map(why).collect()
     }
 
@@ -222,9 +219,9 @@ impl Trace {
 
     /// Iterates over the observations and factors.
     pub(super) fn scored_nodes(&self) -> impl Iterator<Item = NodeId> {
-        self.graph.clean().filter(|n| {
-            matches!(self.graph.op(&self.code, *n), Op::Observe { .. } | Op::Factor { .. })
-        })
+        self.graph
+            .clean()
+            .filter(|n| matches!(self.graph.op(*n), Op::Observe { .. } | Op::Factor { .. }))
     }
 
     pub(super) fn scored(&self) -> Vec<(NodeId, f64)> {
@@ -245,7 +242,7 @@ impl Trace {
     #[doc(hidden)]
     pub fn with_steps(&self) -> Vec<Address> {
         let stepped = self.likelihoods_at().filter(|(_, l, _)| l.has_steps());
-        stepped.map(|(n, ..)| self.graph.address(&self.code, n)).collect()
+        stepped.map(|(n, ..)| self.graph.address(n)).collect()
     }
 
     /// Iterates over the likelihoods that are not distributions, with the value observed
@@ -257,13 +254,12 @@ impl Trace {
     /// The same, with the nodes of the observations.
     fn likelihoods_at(&self) -> impl Iterator<Item = (NodeId, &dyn Likelihood, &Value)> {
         self.scored_nodes().filter_map(|n| {
-            let Op::Observe { dist: DistSpec::Value(o), value, .. } = self.graph.op(&self.code, n)
-            else {
+            let Op::Observe { dist: DistSpec::Value(o), value, .. } = self.graph.op(n) else {
                 return None;
             };
             let frame = self.graph.store[n].frame;
-            let Value::Likelihood(l) = self.graph.value(&self.code, frame, *o) else { return None };
-            let observed = self.graph.observed_value(&self.code, n, *value, &mut node::Deps::new());
+            let Value::Likelihood(l) = self.graph.value(frame, *o) else { return None };
+            let observed = self.graph.observed_value(n, *value, &mut node::Deps::new());
             Some((n, &**l, observed))
         })
     }

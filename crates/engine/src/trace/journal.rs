@@ -8,7 +8,6 @@
 use super::choices::{Choices, Listed};
 use super::node::*;
 use super::store::Store;
-use crate::lang::code::Code;
 use crate::lang::key::Key;
 use crate::lang::value::Value;
 use pcadlang_numerics::num::ExactSum;
@@ -69,7 +68,7 @@ pub(crate) struct Before {
 
 impl Entry {
     /// Undoes the mutation.
-    pub fn undo(self, code: &Code, store: &mut Store, choices: &mut Choices) {
+    pub fn undo(self, store: &mut Store, choices: &mut Choices) {
         match self {
             Entry::Node { id, value, score, refs, changed, state, flags } => {
                 let node = &mut store[id];
@@ -96,7 +95,7 @@ impl Entry {
                     t.deps = old;
                 }
             }
-            Entry::FrameMade(f) => store.free_frame(code, f),
+            Entry::FrameMade(f) => store.free_frame(f),
             Entry::FrameDetached(f) => store[f].attached = true,
             Entry::PassMade(n, pass) => {
                 if let Some(Side::Loop(l)) = store[n].side.as_deref_mut() {

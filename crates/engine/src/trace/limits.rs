@@ -5,7 +5,6 @@
 use super::node::NodeId;
 use super::store::Store;
 use super::update::Failure;
-use crate::lang::code::Code;
 use crate::lang::error::FaultKind;
 use crate::lang::value::{Extent, MOST_ELEMENTS, MOST_NESTED, Value};
 use pcadlang_numerics::platform::clock::Instant;
@@ -177,24 +176,19 @@ impl Budget {
 
     /// Counts one evaluation.
     #[inline]
-    pub fn count_operation(
-        &mut self,
-        store: &Store,
-        code: &Code,
-        n: NodeId,
-    ) -> Result<(), Failure> {
+    pub fn count_operation(&mut self, store: &Store, n: NodeId) -> Result<(), Failure> {
         self.operations += 1;
         self.since_look += 1;
         if self.operations > self.limits.operations {
             let message =
                 format!("one evaluation took more than {} operations", self.limits.operations);
-            return Err(store.fail(code, n, FaultKind::Limit, message, Some(raise("operations"))));
+            return Err(store.fail(n, FaultKind::Limit, message, Some(raise("operations"))));
         }
-        if self.since_look >= BETWEEN_LOOKS { self.look_at_clock(store, code, n) } else { Ok(()) }
+        if self.since_look >= BETWEEN_LOOKS { self.look_at_clock(store, n) } else { Ok(()) }
     }
 
     #[cold]
-    fn look_at_clock(&mut self, store: &Store, code: &Code, n: NodeId) -> Result<(), Failure> {
+    fn look_at_clock(&mut self, store: &Store, n: NodeId) -> Result<(), Failure> {
         self.since_look = 0;
         if !self.limits.stop.is_asked() {
             self.late = None;
@@ -206,7 +200,7 @@ impl Budget {
         }
         let message = "stopped in the middle of an evaluation".to_owned();
         let hint = "one evaluation of the program took longer than the remaining time".to_owned();
-        Err(store.fail(code, n, FaultKind::Stopped, message, Some(hint)))
+        Err(store.fail(n, FaultKind::Stopped, message, Some(hint)))
     }
 
     /// Counts the elements of a value that a node made, and rejects values that are too
@@ -215,7 +209,6 @@ impl Budget {
     pub fn count_elements(
         &mut self,
         store: &Store,
-        code: &Code,
         n: NodeId,
         value: &Value,
     ) -> Result<(), Failure> {
@@ -224,7 +217,7 @@ impl Budget {
             Value::Array(xs) => xs.len(),
             Value::Str(s) => s.len() / 8,
             Value::List(_) | Value::Record(_) => {
-                check_extent(store, code, n, value)?;
+                check_extent(store, n, value)?;
                 value.len().unwrap_or(0)
             }
             Value::Object(o) => {
@@ -239,13 +232,13 @@ impl Budget {
                 "the values made by one evaluation have more than {} elements",
                 self.limits.elements
             );
-            return Err(store.fail(code, n, FaultKind::Limit, message, Some(raise("elements"))));
+            return Err(store.fail(n, FaultKind::Limit, message, Some(raise("elements"))));
         }
         Ok(())
     }
 }
 
-fn check_extent(store: &Store, code: &Code, n: NodeId, value: &Value) -> Result<(), Failure> {
+fn check_extent(store: &Store, n: NodeId, value: &Value) -> Result<(), Failure> {
     let (message, hint) = match value.extent() {
         Extent::Fits => return Ok(()),
         Extent::TooDeep => (
@@ -257,5 +250,5 @@ fn check_extent(store: &Store, code: &Code, n: NodeId, value: &Value) -> Result<
             "an array that is used several times counts each time",
         ),
     };
-    Err(store.fail(code, n, FaultKind::Limit, message, Some(hint.into())))
+    Err(store.fail(n, FaultKind::Limit, message, Some(hint.into())))
 }

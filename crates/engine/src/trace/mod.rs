@@ -83,7 +83,7 @@ impl Trace {
     /// Returns a trace in which nothing has run: queries draw from the prior, and
     /// observations are ignored.
     pub fn prior(code: Arc<Code>, limits: Limits) -> Self {
-        let graph = Graph::new(&code, limits);
+        let graph = Graph::new(Arc::clone(&code), limits);
         Trace { code, graph, update: None, coarse: Coarse::default(), identity: Arc::new(()) }
     }
 
@@ -139,7 +139,7 @@ impl Trace {
         g.propagate(&trace.code)?;
         (g.update.starting, g.update.spread) = (false, None);
         let weight = g.weight(&before);
-        g.commit(&trace.code);
+        g.commit();
         g.update.constraints.clear();
         g.revision = 0;
         Ok((trace, weight))
@@ -216,7 +216,7 @@ impl Trace {
                 Ok(weight)
             }
             Err(e) => {
-                self.graph.rollback(&self.code, before);
+                self.graph.rollback(before);
                 Err(e)
             }
         }
@@ -274,14 +274,14 @@ impl Trace {
     pub fn commit(&mut self) {
         if self.update.take().is_some() {
             self.keep_pending();
-            self.graph.commit(&self.code);
+            self.graph.commit();
         }
     }
 
     /// Undoes the pending proposal, if there is one.
     pub fn rollback(&mut self) {
         if let Some(before) = self.update.take() {
-            self.graph.rollback(&self.code, before);
+            self.graph.rollback(before);
         }
     }
 
@@ -356,7 +356,7 @@ impl Trace {
             scored.extend(observed);
         }
         scored.retain(|n| weight(*n) != 0.0);
-        self.graph.gradient(&self.code, targets, &scored, (power, weight), out)
+        self.graph.gradient(targets, &scored, (power, weight), out)
     }
 
     /// True if nothing has been committed since the program was run.

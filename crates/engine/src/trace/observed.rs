@@ -43,12 +43,12 @@ pub struct Replicate {
 impl Trace {
     /// Returns the observations with their values, by address; factors are not included.
     pub fn observed(&self) -> Vec<Observation> {
-        let (g, code) = (&self.graph, &*self.code);
+        let g = &self.graph;
         let one = |n: NodeId| {
-            let Op::Observe { value, site, .. } = g.op(code, n) else { return None };
-            let hash = g.site_hash(code, g.store[n].frame, *site);
-            let value = g.observed_value(code, n, *value, &mut Deps::new()).clone();
-            Some(Observation { address: g.address(code, n), hash, value })
+            let Op::Observe { value, site, .. } = g.op(n) else { return None };
+            let hash = g.site_hash(g.store[n].frame, *site);
+            let value = g.observed_value(n, *value, &mut Deps::new()).clone();
+            Some(Observation { address: g.address(n), hash, value })
         };
         let mut all: Vec<_> = self.scored_nodes().filter_map(one).collect();
         all.sort_by(|a, b| a.address.cmp(&b.address));
@@ -61,17 +61,17 @@ impl Trace {
     /// # Errors
     /// If a likelihood fails while it samples.
     pub fn replicate(&self, draws: Draws) -> TraceResult<Replicate> {
-        let (g, code) = (&self.graph, &*self.code);
+        let g = &self.graph;
         let mut all = Vec::new();
         let mut silent = Vec::new();
         for n in self.scored_nodes() {
-            let address = g.address(code, n);
-            let Op::Observe { site, .. } = g.op(code, n) else {
+            let address = g.address(n);
+            let Op::Observe { site, .. } = g.op(n) else {
                 silent.push((address, "a factor".to_owned()));
                 continue;
             };
-            let hash = g.site_hash(code, g.store[n].frame, *site);
-            match g.draw_observed(code, n, &mut draws.stream(hash))? {
+            let hash = g.site_hash(g.store[n].frame, *site);
+            match g.draw_observed(n, &mut draws.stream(hash))? {
                 Ok(value) => all.push((address, hash, value)),
                 Err(what) => silent.push((address, what)),
             }
@@ -99,16 +99,17 @@ impl Trace {
     /// elements). Sorted by hash, so that the same observations come in the same order.
     /// `None` if there are more than `most` values.
     pub fn pointwise(&self, most: usize) -> Option<Vec<(u64, Vec<f64>)>> {
-        let (g, code) = (&self.graph, &*self.code);
+        let g = &self.graph;
         let (mut all, mut count) = (Vec::new(), 0);
         for n in self.scored_nodes() {
-            let Op::Observe { dist: spec, value, site, .. } = g.op(code, n) else { continue };
+            let Op::Observe { dist: spec, value, site, .. } = g.op(n) else { continue };
             let (mut deps, frame) = (Deps::new(), g.store[n].frame);
-            let observed = g.observed_value(code, n, *value, &mut deps);
-            let likelihood = matches!(spec, DistSpec::Value(o) if !matches!(g.value(code, frame, *o), Value::Dist(_)));
+            let observed = g.observed_value(n, *value, &mut deps);
+            let likelihood =
+                matches!(spec, DistSpec::Value(o) if !matches!(g.value(frame, *o), Value::Dist(_)));
             let scores = match likelihood {
                 true => vec![self.score_at(n)],
-                false => match g.make_dist(code, n, frame, spec, &mut deps) {
+                false => match g.make_dist(n, frame, spec, &mut deps) {
                     Ok(dist) => pointwise(&dist, observed),
                     Err(_) => vec![f64::NAN],
                 },
@@ -117,7 +118,7 @@ impl Trace {
             if count > most {
                 return None;
             }
-            all.push((g.site_hash(code, frame, *site), scores));
+            all.push((g.site_hash(frame, *site), scores));
         }
         all.sort_by_key(|(hash, _)| *hash);
         Some(all)
@@ -154,9 +155,9 @@ impl Trace {
 
     /// Returns the observations by the hashes of their addresses.
     pub(super) fn observation_nodes(&self) -> FxHashMap<u64, NodeId> {
-        let (g, code) = (&self.graph, &*self.code);
-        let hashed = |n: NodeId| match g.op(code, n) {
-            Op::Observe { site, .. } => Some((g.site_hash(code, g.store[n].frame, *site), n)),
+        let g = &self.graph;
+        let hashed = |n: NodeId| match g.op(n) {
+            Op::Observe { site, .. } => Some((g.site_hash(g.store[n].frame, *site), n)),
             _ => None,
         };
         self.scored_nodes().filter_map(hashed).collect()

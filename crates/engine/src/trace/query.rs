@@ -45,7 +45,7 @@ impl Trace {
         let root = self.graph.store[FrameId::ROOT].clone();
         let frame = Frame { block: function, parent: FrameId::ROOT, depth: 1, args, ..root };
         let evaluate = |graph: &mut Graph, code: &Code| {
-            let frame = graph.make_frame(code, frame)?;
+            let frame = graph.make_frame(frame)?;
             graph.query(code, frame, code.blocks[function].result.as_slice())
         };
         self.asked(evaluate, draws, |_, mut values| Ok(values.pop().unwrap_or_default()))
@@ -68,7 +68,7 @@ impl Trace {
             draws,
             |trace, values| {
                 let Graph { choices, store, update, .. } = &mut trace.graph;
-                choices.update_selections(store, update, &trace.code)?;
+                choices.update_selections(store, update)?;
                 Ok(look(trace, values))
             },
         )
@@ -88,7 +88,7 @@ impl Trace {
         let result = evaluate(&mut self.graph, &self.code);
         self.graph.score.before = None;
         let result = result.and_then(|values| used(self, values));
-        self.graph.rollback(&self.code, before);
+        self.graph.rollback(before);
         result
     }
 
@@ -111,7 +111,7 @@ impl Trace {
     #[doc(hidden)]
     pub fn surrogate(&mut self, address: &Address, draws: Draws) -> TraceResult<Option<f64>> {
         let Some((n, _)) =
-            self.scored().into_iter().find(|(n, _)| self.graph.address(&self.code, *n) == *address)
+            self.scored().into_iter().find(|(n, _)| self.graph.address(*n) == *address)
         else {
             return Ok(None);
         };
@@ -119,7 +119,7 @@ impl Trace {
         let before = self.graph.begin();
         self.graph.update.draws = draws;
         let result = self.graph.surrogate_score(&self.code, n);
-        self.graph.rollback(&self.code, before);
+        self.graph.rollback(before);
         result
     }
 }
@@ -136,12 +136,12 @@ impl Graph {
             if let Some(n) = self.resolve(frame, *o) {
                 self.evaluate(code, n)?;
             }
-            if let Value::Container(r) = self.value(code, frame, *o) {
+            if let Value::Container(r) = self.value(frame, *o) {
                 let gather = r.node.gather();
                 self.evaluate(code, gather)?;
             }
             let mut deps = Deps::new();
-            values.push(self.plain(code, frame, *o, &mut deps).clone());
+            values.push(self.plain(frame, *o, &mut deps).clone());
         }
         Ok(values)
     }

@@ -19,6 +19,8 @@ use std::sync::Arc;
 /// The nodes and frames of one execution.
 #[derive(Clone, Debug)]
 pub(crate) struct Store {
+    /// The program.
+    pub code: Arc<Code>,
     nodes: Vec<Node>,
     frames: Vec<Frame>,
     free_frames: Vec<FrameId>,
@@ -60,7 +62,7 @@ table!(FrameId, Frame, frames);
 
 impl Store {
     /// Creates the store of a program that has not run: the frame of the top level.
-    pub fn new(code: &Code) -> Self {
+    pub fn new(code: Arc<Code>) -> Self {
         let mut store = Store {
             nodes: Vec::new(),
             frames: Vec::new(),
@@ -71,8 +73,9 @@ impl Store {
             version: 0,
             observed: Arc::clone(&code.observed),
             incremental: true,
+            code,
         };
-        store.place_frame(code, Frame { path: ROOT_HASH, ..Frame::default() });
+        store.place_frame(Frame { path: ROOT_HASH, ..Frame::default() });
         store
     }
 
@@ -108,8 +111,8 @@ impl Store {
     }
 
     /// Allocates a frame and its nodes, re-using freed storage.
-    pub fn place_frame(&mut self, code: &Code, mut frame: Frame) -> FrameId {
-        let block = &code.blocks[frame.block];
+    pub fn place_frame(&mut self, mut frame: Frame) -> FrameId {
+        let block = &self.code.blocks[frame.block];
         let id = self.free_frames.pop().unwrap_or(FrameId::new(self.frames.len()));
         frame.base = self.free_bases[frame.block].pop().unwrap_or_else(|| {
             let base = NodeId::new(self.nodes.len());
@@ -129,9 +132,9 @@ impl Store {
     }
 
     /// Frees a frame's storage.
-    pub fn free_frame(&mut self, code: &Code, f: FrameId) {
+    pub fn free_frame(&mut self, f: FrameId) {
         let (block, base) = (self[f].block, self[f].base);
-        for slot in code.blocks[block].slots() {
+        for slot in self.code.blocks[block].slots() {
             let outside = self[base + slot].outside;
             if outside != 0 {
                 let list = self.outside_mut(base + slot);
@@ -152,14 +155,14 @@ impl Store {
 
     /// Returns the operation that a node evaluates.
     #[inline]
-    pub fn op<'c>(&self, code: &'c Code, n: NodeId) -> &'c Op {
-        &code.ops[self[n].op]
+    pub fn op(&self, n: NodeId) -> &Op {
+        &self.code.ops[self[n].op]
     }
 
     /// Returns the static facts about a node's slot.
     #[inline]
-    pub fn slot_facts<'c>(&self, code: &'c Code, n: NodeId) -> &'c SlotFacts {
-        &code.slots[self[n].op]
+    pub fn slot_facts(&self, n: NodeId) -> &SlotFacts {
+        &self.code.slots[self[n].op]
     }
 
     /// Returns the node that an operand of a frame's block refers to; `None` for
@@ -182,9 +185,9 @@ impl Store {
     }
 
     /// Returns the value of an evaluated operand.
-    pub fn value<'a>(&'a self, code: &'a Code, frame: FrameId, o: Operand) -> &'a Value {
+    pub fn value(&self, frame: FrameId, o: Operand) -> &Value {
         match o {
-            Operand::Const(i) => code.const_value(i),
+            Operand::Const(i) => self.code.const_value(i),
             _ => match self.resolve(frame, o) {
                 Some(n) => &self[n].value,
                 None => &Value::Unit,
@@ -201,7 +204,6 @@ impl Store {
     /// the node to wait for.
     pub(crate) fn inputs<'a>(
         &'a self,
-        code: &'a Code,
         frame: FrameId,
         operands: &[Operand],
         deps: &mut Deps,
@@ -209,7 +211,7 @@ impl Store {
         let mut values = SmallVec::new();
         for o in operands {
             let value = match self.resolve(frame, *o) {
-                None => self.value(code, frame, *o),
+                None => self.value(frame, *o),
                 Some(m) => {
                     let node = &self[m];
                     if node.state != State::Clean {
@@ -235,14 +237,8 @@ impl Store {
 
     /// Returns the value of an operand, with a container read as an array or record;
     /// nodes read for that are added to `deps`.
-    pub(super) fn plain<'a>(
-        &'a self,
-        code: &'a Code,
-        frame: FrameId,
-        o: Operand,
-        deps: &mut Deps,
-    ) -> &'a Value {
-        match self.value(code, frame, o) {
+    pub(super) fn plain<'a>(&'a self, frame: FrameId, o: Operand, deps: &mut Deps) -> &'a Value {
+        match self.value(frame, o) {
             Value::Container(r) => {
                 deps.push(r.node.gather());
                 &self[r.node.gather()].value
@@ -260,8 +256,8 @@ impl Store {
     }
 
     /// Returns the number of keys of an element of a container.
-    pub fn key_width(&self, code: &Code, container: NodeId) -> usize {
-        match self.op(code, container) {
+    pub fn key_width(&self, container: NodeId) -> usize {
+        match self.op(container) {
             Op::Container { sources, .. } => sources[0].keys.len(),
             _ => 1,
         }
@@ -269,15 +265,15 @@ impl Store {
 
     /// Returns the operand that feeds a parameter, with the caller's frame to which it
     /// belongs.
-    pub fn argument(&self, code: &Code, n: NodeId) -> Option<(FrameId, Operand)> {
+    pub fn argument(&self, n: NodeId) -> Option<(FrameId, Operand)> {
         let frame = &self[self[n].frame];
-        let Op::Param { index, .. } = self.op(code, n) else { return None };
+        let Op::Param { index, .. } = self.op(n) else { return None };
         let i = match &frame.args {
             Arguments::Positional(count) => (index < count).then_some(*index),
             Arguments::Mapped(map) => map.get(*index as usize).copied().flatten(),
             _ => None,
         }?;
-        match self.op(code, frame.owner) {
+        match self.op(frame.owner) {
             Op::Call { args, .. } => Some((self[frame.owner].frame, args[i as usize].1)),
             _ => None,
         }
@@ -286,8 +282,8 @@ impl Store {
     /// Calls `f` with every node that `n` holds, structure first, and whether the link is
     /// an outside one. The order matters: a change of an earlier node may make later ones
     /// irrelevant.
-    pub fn each_dep(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId, bool)) {
-        let facts = self.slot_facts(code, n);
+    pub fn each_dep(&self, n: NodeId, mut f: impl FnMut(NodeId, bool)) {
+        let facts = self.slot_facts(n);
         if let Some(reads) = &facts.reads {
             for (up, slot) in reads {
                 match up {
@@ -296,23 +292,23 @@ impl Store {
                 }
             }
         } else {
-            self.each_changing_dep(code, n, &mut f);
+            self.each_changing_dep(n, &mut f);
         }
         if self[n].side.is_some() {
-            self.each_side_dep(code, n, f);
+            self.each_side_dep(n, f);
         }
     }
 
     /// Calls `f` with the operands that a node holds, if they depend on the state.
-    fn each_changing_dep(&self, code: &Code, n: NodeId, f: &mut impl FnMut(NodeId, bool)) {
+    fn each_changing_dep(&self, n: NodeId, f: &mut impl FnMut(NodeId, bool)) {
         let frame = self[n].frame;
         let mut operand = |o: Operand| {
             if let Some(d) = self.resolve(frame, o) {
                 f(d, !matches!(o, Operand::Local(_)));
             }
         };
-        match self.op(code, n) {
-            Op::Param { default, .. } => match self.argument(code, n) {
+        match self.op(n) {
+            Op::Param { default, .. } => match self.argument(n) {
                 Some((af, o)) => {
                     if let Some(d) = self.resolve(af, o) {
                         f(d, !matches!(o, Operand::Local(_)));
@@ -339,12 +335,12 @@ impl Store {
     }
 
     /// The part of [`Graph::each_dep`] that is not operands.
-    pub fn each_side_dep(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId, bool)) {
+    pub fn each_side_dep(&self, n: NodeId, mut f: impl FnMut(NodeId, bool)) {
         let Some(side) = self[n].side.as_deref() else { return };
         side.deps().iter().for_each(|d| f(*d, true));
         match side {
             Side::Child(c) if c.result != NodeId::NONE => {
-                f(c.result, !self.is_owned_result(code, c.result, n))
+                f(c.result, !self.is_owned_result(c.result, n))
             }
             Side::MemoCall(MemoCall { result, .. }) | Side::Loop(Loop { result, .. })
                 if *result != NodeId::NONE =>
@@ -369,9 +365,10 @@ impl Store {
 
     /// True if the link from a frame's result to the frame's owner can be derived from
     /// the block.
-    pub fn is_owned_result(&self, code: &Code, result: NodeId, owner: NodeId) -> bool {
+    pub fn is_owned_result(&self, result: NodeId, owner: NodeId) -> bool {
         let f = &self[self[result].frame];
-        f.owner == owner && code.blocks[f.block].result == Some(Operand::Local(result - f.base))
+        f.owner == owner
+            && self.code.blocks[f.block].result == Some(Operand::Local(result - f.base))
     }
 
     /// Returns the users of a node in other frames, and how many of them have released it.
@@ -403,7 +400,7 @@ impl Store {
     }
 
     /// Removes the users that have released a node from its list of outside users.
-    pub fn tidy(&mut self, code: &Code, n: NodeId) {
+    pub fn tidy(&mut self, n: NodeId) {
         if !self.outside(n).is_untidy() {
             return;
         }
@@ -415,9 +412,7 @@ impl Store {
             if *u != user {
                 (user, readings) = (*u, 0);
                 if self[user].state != State::Empty {
-                    self.each_dep(code, user, |d, outside| {
-                        readings += u32::from(outside && d == n)
-                    });
+                    self.each_dep(user, |d, outside| readings += u32::from(outside && d == n));
                 }
             }
             let kept = readings > 0;
@@ -428,14 +423,14 @@ impl Store {
     }
 
     /// The error of an entry without a value among what a node reads.
-    fn entry_without_value(&self, code: &Code, n: NodeId) -> Option<Fault> {
+    fn entry_without_value(&self, n: NodeId) -> Option<Fault> {
         let node = self.get(n)?;
-        let (mut found, op) = (None, self.op(code, n));
+        let (mut found, op) = (None, self.op(n));
         if matches!(op, Op::Index { .. } | Op::Call { .. }) {
             return None;
         }
         op.operands(|o| {
-            let entry = Missing::first_in(self.value(code, node.frame, o));
+            let entry = Missing::first_in(self.value(node.frame, o));
             found = found.take().or(entry.map(Missing::fault));
         });
         found
@@ -444,7 +439,6 @@ impl Store {
     /// Builds an error at a node.
     pub fn fail(
         &self,
-        code: &Code,
         n: NodeId,
         kind: FaultKind,
         message: String,
@@ -461,30 +455,29 @@ impl Store {
                     break;
                 }
                 let of = &self[self[frame.owner].frame];
-                if let BlockKind::Function { name, .. } = &code.blocks[frame.block].kind {
-                    let span = code.blocks[of.block].spans[frame.owner - of.base];
+                if let BlockKind::Function { name, .. } = &self.code.blocks[frame.block].kind {
+                    let span = self.code.blocks[of.block].spans[frame.owner - of.base];
                     calls.push((name.clone(), span));
                 }
                 f = self[frame.owner].frame;
             }
             calls.reverse();
             let frame = &self[self[n].frame];
-            (code.blocks[frame.block].spans[n - frame.base], self.address_near(code, n))
+            (self.code.blocks[frame.block].spans[n - frame.base], self.address_near(n))
         };
         // A type error of a missing entry says where the entry is.
-        let missing =
-            if kind == FaultKind::Type { self.entry_without_value(code, n) } else { None };
+        let missing = if kind == FaultKind::Type { self.entry_without_value(n) } else { None };
         let Fault { kind, message, hint } = missing.unwrap_or(Fault { kind, message, hint });
         Box::new(RunError { kind, message, span, address, calls, hint })
     }
 
     /// Turns a fault of a built-in into an error at a node.
-    pub(super) fn fault(&self, code: &Code, n: NodeId, f: Fault) -> Failure {
-        self.fail(code, n, f.kind, f.message, f.hint)
+    pub(super) fn fault(&self, n: NodeId, f: Fault) -> Failure {
+        self.fail(n, f.kind, f.message, f.hint)
     }
 
     /// Builds a type error at a node.
-    pub(super) fn type_error(&self, code: &Code, n: NodeId, message: String) -> Failure {
-        self.fail(code, n, FaultKind::Type, message, None)
+    pub(super) fn type_error(&self, n: NodeId, message: String) -> Failure {
+        self.fail(n, FaultKind::Type, message, None)
     }
 }

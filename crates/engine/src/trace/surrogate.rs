@@ -19,8 +19,7 @@ impl Trace {
     pub fn under_surrogates(&self, at: &Selector) -> TraceResult<Option<Trace>> {
         let mut present: FxHashMap<OpId, bool> = FxHashMap::default();
         for n in self.scored_nodes() {
-            *present.entry(self.graph.store[n].op).or_default() |=
-                at.names(&self.graph.address(&self.code, n));
+            *present.entry(self.graph.store[n].op).or_default() |= at.names(&self.graph.address(n));
         }
         let named = |op: &OpId| match &self.code.ops[*op] {
             Op::Observe { coarse: Some(_), site, .. } => {
@@ -72,7 +71,7 @@ impl Trace {
         let mut own = Vec::new();
         pairs(self, other, |here, there| {
             if let (Some(t), None) = (here, there) {
-                own.push(self.graph.choice_hash(&self.code, t.node));
+                own.push(self.graph.choice_hash(t.node));
             }
         });
         own

@@ -7,7 +7,7 @@ use super::select::{Facts, Selector};
 use super::store::Store;
 use super::update::Failure;
 use crate::lang::address::Address;
-use crate::lang::code::{Code, DistSpec, Op, Operand};
+use crate::lang::code::{DistSpec, Op, Operand};
 use crate::lang::density::{self, Score, is_repeated, likelihood_score};
 use crate::lang::error::Fault;
 use crate::lang::key::Key;
@@ -19,8 +19,8 @@ use std::sync::Arc;
 
 impl Store {
     /// True if a selector selects a choice.
-    pub fn selects(&self, code: &Code, selector: &Selector, t: &Target) -> bool {
-        let mut facts = self.facts(code, t.node, selector.needs_address(), None);
+    pub fn selects(&self, selector: &Selector, t: &Target) -> bool {
+        let mut facts = self.facts(t.node, selector.needs_address(), None);
         if t.element != NONE && selector.needs_address() {
             push_key(&mut facts.address, t.element);
         }
@@ -29,14 +29,14 @@ impl Store {
 
     /// Returns the facts that selectors need about a choice (or an observation, for
     /// `project`).
-    pub fn facts(&self, code: &Code, n: NodeId, with_address: bool, dist: Option<&Dist>) -> Facts {
-        let made = if dist.is_none() { self.dist_of(code, n) } else { None };
+    pub fn facts(&self, n: NodeId, with_address: bool, dist: Option<&Dist>) -> Facts {
+        let made = if dist.is_none() { self.dist_of(n) } else { None };
         let dist = dist.or(made.as_ref());
         let support = dist.map(Dist::stored_support);
         Facts {
-            choice: matches!(self.op(code, n), Op::Draw { .. }),
-            address: if with_address { self.address(code, n) } else { Address::default() },
-            tags: self.tags(code, n),
+            choice: matches!(self.op(n), Op::Draw { .. }),
+            address: if with_address { self.address(n) } else { Address::default() },
+            tags: self.tags(n),
             discrete: support.as_ref().is_some_and(Support::has_discrete_part),
             finite: support.as_ref().is_some_and(Support::is_finite),
             gaussian: dist.is_some_and(Dist::is_gaussian),
@@ -44,16 +44,16 @@ impl Store {
     }
 
     /// Returns the distribution of a choice under the current values of its parameters.
-    pub fn dist_of(&self, code: &Code, n: NodeId) -> Option<Dist> {
-        let Op::Draw { dist, .. } = self.op(code, n) else { return None };
-        if let Some(simple) = self.simple_dist(code, n) {
+    pub fn dist_of(&self, n: NodeId) -> Option<Dist> {
+        let Op::Draw { dist, .. } = self.op(n) else { return None };
+        if let Some(simple) = self.simple_dist(n) {
             return Some(simple);
         }
         let frame = self[n].frame;
-        self.make_dist(code, n, frame, dist, &mut Deps::new()).ok()
+        self.make_dist(n, frame, dist, &mut Deps::new()).ok()
     }
 
-    fn tags(&self, code: &Code, n: NodeId) -> Vec<(Arc<str>, Option<Key>)> {
+    fn tags(&self, n: NodeId) -> Vec<(Arc<str>, Option<Key>)> {
         let mut tags = Vec::new();
         let mut node = n;
         loop {
@@ -62,7 +62,7 @@ impl Store {
             | Op::Call { site, .. }
             | Op::Map { site, .. }
             | Op::Fold { site, .. }
-            | Op::Mem { site, .. }) = self.op(code, node)
+            | Op::Mem { site, .. }) = self.op(node)
             else {
                 let owner = self[frame].owner;
                 if owner == NodeId::NONE {
@@ -71,9 +71,9 @@ impl Store {
                 node = owner;
                 continue;
             };
-            for t in &code.sites[*site].tags {
-                let value = t.value.and_then(|o| Key::from_value(self.value(code, frame, o)));
-                tags.push((Arc::clone(&code.tags[t.name as usize]), value));
+            for t in &self.code.sites[*site].tags {
+                let value = t.value.and_then(|o| Key::from_value(self.value(frame, o)));
+                tags.push((Arc::clone(&self.code.tags[t.name as usize]), value));
             }
             match self[frame].owner {
                 NodeId::NONE => return tags,
@@ -85,9 +85,9 @@ impl Store {
     /// True if a stale choice may get another value without being a target: a whitened
     /// one moves with its distribution, and one whose key, length or kind changes is
     /// resampled.
-    pub fn may_be_redrawn(&self, code: &Code, n: NodeId) -> bool {
+    pub fn may_be_redrawn(&self, n: NodeId) -> bool {
         let node = &self[n];
-        let Op::Draw { dist, keys, .. } = self.op(code, n) else { return false };
+        let Op::Draw { dist, keys, .. } = self.op(n) else { return false };
         let stale = |o: &Operand| {
             self.resolve(node.frame, *o).is_some_and(|k| matches!(self[k].state, State::Stale))
         };
@@ -109,41 +109,40 @@ impl Store {
     /// Returns the distribution of a draw or observation whose parameters are evaluated.
     pub(crate) fn make_dist(
         &self,
-        code: &Code,
         n: NodeId,
         frame: FrameId,
         spec: &DistSpec,
         deps: &mut Deps,
     ) -> Result<Dist, Failure> {
-        match self.dist_now(code, n, frame, spec, deps) {
+        match self.dist_now(n, frame, spec, deps) {
             Ok(dist) => dist,
-            Err(_) => Err(self.type_error(code, n, "its parameters are not evaluated".into())),
+            Err(_) => Err(self.type_error(n, "its parameters are not evaluated".into())),
         }
     }
 
     /// Returns the distribution of a draw or observation, or else the node to wait for.
     pub(crate) fn dist_now(
         &self,
-        code: &Code,
         n: NodeId,
         frame: FrameId,
         spec: &DistSpec,
         deps: &mut Deps,
     ) -> Result<Result<Dist, Failure>, NodeId> {
-        let values = self.inputs(code, frame, spec.operands(), deps)?;
-        Ok(self.dist_of_values(code, n, spec, &values))
+        let values = self.inputs(frame, spec.operands(), deps)?;
+        Ok(self.dist_of_values(n, spec, &values))
     }
 
     /// Returns the distribution with these parameters.
     pub(crate) fn dist_of_values(
         &self,
-        code: &Code,
         n: NodeId,
         spec: &DistSpec,
         values: &[&Value],
     ) -> Result<Dist, Failure> {
         let made = match spec {
-            DistSpec::Family { builtin, .. } => code.builtins.get(*builtin).distribution(values),
+            DistSpec::Family { builtin, .. } => {
+                self.code.builtins.get(*builtin).distribution(values)
+            }
             DistSpec::Value(_) => match values[0] {
                 Value::Dist(d) => Ok(Dist::clone(d)),
                 Value::Likelihood(l) => {
@@ -158,18 +157,18 @@ impl Store {
                 .with_hint("write `=` to bind a value")),
             },
         };
-        made.map_err(|f| self.fault(code, n, f))
+        made.map_err(|f| self.fault(n, f))
     }
 
     /// Returns the hash of a choice's address.
-    pub(crate) fn choice_hash(&self, code: &Code, n: NodeId) -> u64 {
+    pub(crate) fn choice_hash(&self, n: NodeId) -> u64 {
         if let Some(Side::Choice(c)) = self[n].side.as_deref()
             && let Some(h) = c.hash
         {
             return h;
         }
-        match self.op(code, n) {
-            Op::Draw { site, .. } => self.site_hash(code, self[n].frame, *site),
+        match self.op(n) {
+            Op::Draw { site, .. } => self.site_hash(self[n].frame, *site),
             _ => 0,
         }
     }
@@ -198,25 +197,23 @@ impl Store {
     /// Scores an observation, or returns the node to wait for.
     pub fn observation_score(
         &self,
-        code: &Code,
         n: NodeId,
         frame: FrameId,
         spec: &DistSpec,
         value: Operand,
         deps: &mut Deps,
     ) -> Result<Result<Score, Failure>, NodeId> {
-        let values = self.inputs(code, frame, spec.operands(), deps)?;
-        let observed = match self.replaced(code, n) {
+        let values = self.inputs(frame, spec.operands(), deps)?;
+        let observed = match self.replaced(n) {
             Some(v) => v,
-            None => self.inputs(code, frame, &[value], deps)?[0],
+            None => self.inputs(frame, &[value], deps)?[0],
         };
-        Ok(self.score_of_values(code, n, spec, &values, observed))
+        Ok(self.score_of_values(n, spec, &values, observed))
     }
 
     /// Returns the score of an observation with these parameters.
     pub(crate) fn score_of_values(
         &self,
-        code: &Code,
         n: NodeId,
         spec: &DistSpec,
         values: &[&Value],
@@ -228,19 +225,19 @@ impl Store {
                 v @ Value::Likelihood(_) => {
                     return likelihood_score(v, observed)
                         .map(Score::One)
-                        .map_err(|f| self.fault(code, n, f));
+                        .map_err(|f| self.fault(n, f));
                 }
                 v => {
                     let message = format!(
                         "`observe` needs a distribution or likelihood, got {}",
                         v.type_name()
                     );
-                    return Err(self.type_error(code, n, message));
+                    return Err(self.type_error(n, message));
                 }
             }
         }
-        let dist = self.dist_of_values(code, n, spec, values)?;
-        density::score(&dist, observed).map_err(|f| self.fault(code, n, f))
+        let dist = self.dist_of_values(n, spec, values)?;
+        density::score(&dist, observed).map_err(|f| self.fault(n, f))
     }
 
     /// Adds an observation's or factor's score to a sum.
@@ -253,15 +250,9 @@ impl Store {
     }
 
     /// Adds the score of a choice to one sum, that of an observation or factor to the other.
-    pub(crate) fn put_scored(
-        &self,
-        code: &Code,
-        n: NodeId,
-        prior: &mut ExactSum,
-        likelihood: &mut ExactSum,
-    ) {
+    pub(crate) fn put_scored(&self, n: NodeId, prior: &mut ExactSum, likelihood: &mut ExactSum) {
         let node = &self[n];
-        match (self.op(code, n), node.side.as_deref()) {
+        match (self.op(n), node.side.as_deref()) {
             (Op::Draw { .. }, Some(Side::Choice(c))) if c.elements != NONE => {
                 c.scores.iter().for_each(|s| prior.add(*s));
             }
@@ -289,40 +280,39 @@ impl Store {
     }
 
     /// Returns the value that replaces an observation's value in the program, if any.
-    pub(crate) fn replaced(&self, code: &Code, n: NodeId) -> Option<&Value> {
+    pub(crate) fn replaced(&self, n: NodeId) -> Option<&Value> {
         if self.observed.is_empty() {
             return None;
         }
-        let Op::Observe { site, .. } = self.op(code, n) else { return None };
-        self.observed.get(&self.site_hash(code, self[n].frame, *site))
+        let Op::Observe { site, .. } = self.op(n) else { return None };
+        self.observed.get(&self.site_hash(self[n].frame, *site))
     }
 
     /// Returns the value of an observation; nodes read for it are added to `deps`.
     pub(crate) fn observed_value<'a>(
         &'a self,
-        code: &'a Code,
         n: NodeId,
         value: Operand,
         deps: &mut Deps,
     ) -> &'a Value {
-        match self.replaced(code, n) {
+        match self.replaced(n) {
             Some(v) => v,
-            None => self.plain(code, self[n].frame, value, deps),
+            None => self.plain(self[n].frame, value, deps),
         }
     }
 
     /// Returns a message if the observed value is outside the support of its distribution
     /// under the current parameters, so that its probability is zero.
-    pub(super) fn outside_support(&self, code: &Code, n: NodeId) -> Option<String> {
-        let Op::Observe { dist: spec, value, .. } = self.op(code, n) else { return None };
+    pub(super) fn outside_support(&self, n: NodeId) -> Option<String> {
+        let Op::Observe { dist: spec, value, .. } = self.op(n) else { return None };
         let (mut deps, frame) = (Deps::new(), self[n].frame);
-        let observed = self.observed_value(code, n, *value, &mut deps);
+        let observed = self.observed_value(n, *value, &mut deps);
         if let DistSpec::Value(o) = spec
-            && !matches!(self.value(code, frame, *o), Value::Dist(_))
+            && !matches!(self.value(frame, *o), Value::Dist(_))
         {
             return None;
         }
-        let dist = self.make_dist(code, n, frame, spec, &mut deps).ok()?;
+        let dist = self.make_dist(n, frame, spec, &mut deps).ok()?;
         let count =
             dist.elements().or_else(|| observed.len().filter(|_| is_repeated(&dist, observed)));
         let Some(count) = count else { return outside(&dist, observed) };
@@ -332,25 +322,24 @@ impl Store {
     /// Samples an observation, or describes why it cannot be sampled.
     pub fn draw_observed(
         &self,
-        code: &Code,
         n: NodeId,
         rng: &mut Stream,
     ) -> Result<Result<Value, String>, Failure> {
         let frame = self[n].frame;
-        let Op::Observe { dist: spec, value, .. } = self.op(code, n) else {
+        let Op::Observe { dist: spec, value, .. } = self.op(n) else {
             return Ok(Err("a factor".into()));
         };
         let mut deps = Deps::new();
-        let observed = self.observed_value(code, n, *value, &mut deps);
+        let observed = self.observed_value(n, *value, &mut deps);
         if let DistSpec::Value(o) = spec
-            && let Value::Likelihood(l) = self.value(code, frame, *o)
+            && let Value::Likelihood(l) = self.value(frame, *o)
         {
             return match l.sample(observed, rng) {
-                Some(drawn) => drawn.map(Ok).map_err(|e| self.fault(code, n, Fault::type_error(e))),
+                Some(drawn) => drawn.map(Ok).map_err(|e| self.fault(n, Fault::type_error(e))),
                 None => Ok(Err(format!("the likelihood `{}`", l.name()))),
             };
         }
-        let dist = self.make_dist(code, n, frame, spec, &mut deps)?;
+        let dist = self.make_dist(n, frame, spec, &mut deps)?;
         if dist.is_improper() {
             return Ok(Err(format!("the improper distribution `{}`", dist.name())));
         }

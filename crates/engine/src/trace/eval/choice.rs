@@ -1,6 +1,6 @@
 //! Random choices: drawn when first needed, and absorbing or changed after that.
 
-use crate::lang::code::{Code, DistSpec, Operand};
+use crate::lang::code::{DistSpec, Operand};
 use crate::lang::error::FaultKind;
 use crate::lang::key::Key;
 use crate::lang::value::Value;
@@ -15,7 +15,6 @@ use smallvec::SmallVec;
 impl Graph {
     pub(super) fn evaluate_draw(
         &mut self,
-        code: &Code,
         n: NodeId,
         spec: &DistSpec,
         site: SiteId,
@@ -23,54 +22,54 @@ impl Graph {
     ) -> Result<Poll, Failure> {
         let frame = self.store[n].frame;
         let mut deps = Deps::new();
-        let dist = match self.dist_now(code, n, frame, spec, &mut deps) {
+        let dist = match self.dist_now(n, frame, spec, &mut deps) {
             Ok(dist) => dist?,
-            Err(m) => return self.need(code, m),
+            Err(m) => return self.need(m),
         };
-        if let Some(step) = self.await_all(code, frame, keys)? {
+        if let Some(step) = self.await_all(frame, keys)? {
             return Ok(step);
         }
         let stale = self.store[n].flags & WAS_STALE != 0;
         let own = match keys {
             [] => None,
             _ if stale && !self.any_changed(frame, keys) => self.own_hash(n),
-            _ => Some(self.own_keyed(code, n, frame, site, keys)?),
+            _ => Some(self.own_keyed(n, frame, site, keys)?),
         };
         if stale {
-            let moved = own.is_some_and(|h| self.choice_hash(code, n) != h);
-            if !moved && self.update_choice(code, n, &dist)? {
+            let moved = own.is_some_and(|h| self.choice_hash(n) != h);
+            if !moved && self.update_choice(n, &dist)? {
                 self.set_deps(n, deps);
-                return Ok(self.finish_unchanged(code, n));
+                return Ok(self.finish_unchanged(n));
             }
             // Invalidation stops at plain numbers, so the users of this one were not
             // invalidated for a change of its form.
-            let was_told = self.store[n].flags & TARGET != 0 || self.may_be_redrawn(code, n);
+            let was_told = self.store[n].flags & TARGET != 0 || self.may_be_redrawn(n);
             if !moved && !was_told {
-                return Err(self.reformed(code, n));
+                return Err(self.reformed(n));
             }
-            self.retire_choice(code, n);
+            self.retire_choice(n);
             if self.store[n].flags & HELD != 0 {
                 let mut side: SmallVec<[NodeId; 4]> = SmallVec::new();
-                self.each_side_dep(code, n, |d, _| side.push(d));
+                self.each_side_dep(n, |d, _| side.push(d));
                 side.iter().for_each(|d| self.release(*d, true));
             }
             self.set_side(n, None);
         }
-        let hash = own.unwrap_or_else(|| self.site_hash(code, frame, site));
-        let value = self.draw_fresh(code, n, &dist, hash, own)?;
+        let hash = own.unwrap_or_else(|| self.site_hash(frame, site));
+        let value = self.draw_fresh(n, &dist, hash, own)?;
         self.set_deps(n, deps);
         let epoch = self.update.epoch;
         let node = &mut self.store[n];
         node.value = value;
         node.changed = epoch;
         node.flags &= !TARGET;
-        Ok(self.finish_unchanged(code, n))
+        Ok(self.finish_unchanged(n))
     }
 
-    fn reformed(&self, code: &Code, n: NodeId) -> Failure {
+    fn reformed(&self, n: NodeId) -> Failure {
         let message = "the choice is a number, but its parameters became arrays".to_owned();
         let hint = "write two choices, one for each: if c { a ~ normal([0, 1], 1); a } else { b ~ normal(0, 1); b }";
-        self.fail(code, n, FaultKind::Type, message, Some(hint.into()))
+        self.fail(n, FaultKind::Type, message, Some(hint.into()))
     }
 
     /// True if one of these operands changed in this update.
@@ -83,25 +82,23 @@ impl Graph {
 
     fn own_keyed(
         &self,
-        code: &Code,
         n: NodeId,
         frame: FrameId,
         site: SiteId,
         keys: &[Operand],
     ) -> Result<u64, Failure> {
-        let own = self.own_keys(code, frame, keys);
+        let own = self.own_keys(frame, keys);
         if own.len() < keys.len() {
             keys.iter()
-                .try_for_each(|k| Key::of(self.value(code, frame, *k)).map(drop))
-                .map_err(|f| self.fault(code, n, f))?;
+                .try_for_each(|k| Key::of(self.value(frame, *k)).map(drop))
+                .map_err(|f| self.fault(n, f))?;
         }
-        Ok(self.own_keyed_hash(code, frame, site, &own))
+        Ok(self.own_keyed_hash(frame, site, &own))
     }
 
     /// Gives a choice its first value, from the constraints or the prior.
     fn draw_fresh(
         &mut self,
-        code: &Code,
         n: NodeId,
         dist: &Dist,
         hash: u64,
@@ -119,14 +116,14 @@ impl Graph {
                 for i in 0..count {
                     let given = given.as_ref().and_then(|w| element(w, i));
                     let (one, at) = (dist.element(i), element_hash(hash, i));
-                    let (x, score) = self.draw_one(code, n, &one, at, given)?;
+                    let (x, score) = self.draw_one(n, &one, at, given)?;
                     side.scores.push(score);
                     values.push(Value::from_datum(&x));
                 }
                 Value::from_elements(values)
             }
             None => {
-                let (x, score) = self.draw_one(code, n, dist, hash, given)?;
+                let (x, score) = self.draw_one(n, dist, hash, given)?;
                 self.store[n].score = score;
                 let value = shown(dist, &x);
                 side.stored = dist.is_stored_whitened().then_some(x);
@@ -136,14 +133,13 @@ impl Graph {
         if elements.is_some() || own.is_some() || side.stored.is_some() {
             self.set_side(n, Some(Side::Choice(side)));
         }
-        self.choices.register((&self.store, &mut self.update), code, n, hash, elements, dist);
+        self.choices.register((&self.store, &mut self.update), n, hash, elements, dist);
         Ok(value)
     }
 
     /// Gives a choice or an element of one its first value, and scores it.
     fn draw_one(
         &mut self,
-        code: &Code,
         n: NodeId,
         dist: &Dist,
         hash: u64,
@@ -152,16 +148,16 @@ impl Graph {
         let given =
             given.or_else(|| self.update.constraints.get(&hash).and_then(|c| c.whole(dist)));
         let is_drawn = given.is_none();
-        let x = given.map_or_else(|| self.drawn_now(code, n, dist, hash), Ok)?;
+        let x = given.map_or_else(|| self.drawn_now(n, dist, hash), Ok)?;
         let score = dist.log_density_stored(&x);
         self.score.add_prior(score, is_drawn);
         Ok((x, score))
     }
 
     /// Draws from the prior, or in a first run where that is asked for uniformly.
-    fn drawn_now(&self, code: &Code, n: NodeId, dist: &Dist, hash: u64) -> Result<Datum, Failure> {
+    fn drawn_now(&self, n: NodeId, dist: &Dist, hash: u64) -> Result<Datum, Failure> {
         if dist.is_improper() && !self.update.starting {
-            return Err(self.improper(code, n, dist));
+            return Err(self.improper(n, dist));
         }
         let mut rng = self.update.draws.stream(hash);
         if let Some(width) = self.update.spread {
@@ -180,7 +176,7 @@ impl Graph {
         *flags = if dist.is_improper() { *flags | IMPROPER } else { *flags & !IMPROPER };
     }
 
-    fn improper(&self, code: &Code, n: NodeId, dist: &Dist) -> Failure {
+    fn improper(&self, n: NodeId, dist: &Dist) -> Failure {
         let message = format!("`{}` is improper, so it cannot be sampled", dist.name());
         // Kernels reject such draws. Here no observation depends on the choice, so that no kernel
         // could move it either.
@@ -189,13 +185,13 @@ impl Graph {
             _ => "give it a proper prior, such as normal(0, 10)",
         };
         let hint = format!("observe something that depends on it, or {proper}");
-        self.fail(code, n, FaultKind::Domain, message, Some(hint))
+        self.fail(n, FaultKind::Domain, message, Some(hint))
     }
 
     /// Re-scores a choice under its distribution and applies the pending changes. False
     /// if its form no longer fits (number of elements or dimensions); it must then be
     /// resampled.
-    fn update_choice(&mut self, code: &Code, n: NodeId, dist: &Dist) -> Result<bool, Failure> {
+    fn update_choice(&mut self, n: NodeId, dist: &Dist) -> Result<bool, Failure> {
         if let Some(Side::Choice(c)) = self.store[n].side.as_deref()
             && c.elements != NONE
         {
@@ -203,7 +199,7 @@ impl Graph {
                 return Ok(false);
             }
             self.set_improper(n, dist);
-            self.update_elements(code, n, dist)?;
+            self.update_elements(n, dist)?;
             return Ok(true);
         }
         if dist.elements().is_some() {
@@ -226,13 +222,13 @@ impl Graph {
         }
         let new = match &change {
             None => None,
-            Some(change) => match self.changed(code, n, dist, change, None)? {
+            Some(change) => match self.changed(n, dist, change, None)? {
                 None if matches!(change, Change::White(_)) => {
-                    return Err(self.not_gaussian(code, n));
+                    return Err(self.not_gaussian(n));
                 }
                 None => {
                     let message = "the value does not fit the choice".into();
-                    return Err(self.type_error(code, n, message));
+                    return Err(self.type_error(n, message));
                 }
                 new => new,
             },
@@ -261,8 +257,8 @@ impl Graph {
     }
 
     /// [`Graph::update_choice`] for a choice of several elements.
-    fn update_elements(&mut self, code: &Code, n: NodeId, dist: &Dist) -> Result<(), Failure> {
-        let hash = self.choice_hash(code, n);
+    fn update_elements(&mut self, n: NodeId, dist: &Dist) -> Result<(), Failure> {
+        let hash = self.choice_hash(n);
         let Some(Side::Choice(side)) = self.store[n].side.as_deref() else {
             return Ok(());
         };
@@ -284,7 +280,7 @@ impl Graph {
                 let change =
                     if *element == NONE { change.of_element(i) } else { Some(change.clone()) };
                 let Some(change) = change else { continue };
-                let new = self.changed(code, n, &one, &change, Some(at))?;
+                let new = self.changed(n, &one, &change, Some(at))?;
                 if let (Some(new), Some(x)) = (new, xs.get_mut(i)) {
                     if change.is_from_prior() {
                         self.score.undrawn.add(side.scores[i]);
@@ -314,7 +310,6 @@ impl Graph {
     /// the change does not fit it.
     fn changed(
         &mut self,
-        code: &Code,
         n: NodeId,
         dist: &Dist,
         change: &Change,
@@ -324,14 +319,14 @@ impl Graph {
             Change::Set(d) => Some(d.clone()),
             Change::Value(d) => dist.to_noncentred(d),
             Change::Resample => {
-                let hash = hash.unwrap_or_else(|| self.choice_hash(code, n));
-                Some(self.drawn_now(code, n, dist, hash)?)
+                let hash = hash.unwrap_or_else(|| self.choice_hash(n));
+                Some(self.drawn_now(n, dist, hash)?)
             }
             Change::Free(y) => {
                 let support = dist.stored_support();
                 if support.free_dim() != y.len() {
                     let message = "the choice changed its dimension".to_owned();
-                    return Err(self.fail(code, n, FaultKind::Domain, message, None));
+                    return Err(self.fail(n, FaultKind::Domain, message, None));
                 }
                 let (x, jacobian) = support.from_free(y);
                 self.score.jacobian.add(jacobian);
@@ -352,13 +347,13 @@ impl Graph {
     }
 
     /// Removes a choice that nothing depends on from the score and the register.
-    pub(crate) fn retire_choice(&mut self, code: &Code, n: NodeId) {
+    pub(crate) fn retire_choice(&mut self, n: NodeId) {
         self.update.vanished += 1;
         if self.store[n].flags & IMPROPER != 0 {
             // It cannot be drawn again: the update is irreversible and has zero weight.
             self.score.drawn.add(f64::INFINITY);
         }
-        let hash = self.choice_hash(code, n);
+        let hash = self.choice_hash(n);
         if let Some(stored) = self.stored(n) {
             self.update.removed.push((n, hash, stored));
         }
@@ -389,10 +384,9 @@ impl Graph {
         self.choices.unregister(&mut self.update, n, hash);
     }
 
-    fn not_gaussian(&self, code: &Code, n: NodeId) -> Failure {
+    fn not_gaussian(&self, n: NodeId) -> Failure {
         let message = "this choice has no Gaussian prior".to_owned();
         self.fail(
-            code,
             n,
             FaultKind::Type,
             message,

@@ -20,66 +20,66 @@ impl Graph {
     /// Makes one attempt to run the operation of a node.
     pub(super) fn run_op(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
         let frame = self.store[n].frame;
-        match self.op(code, n) {
-            Op::Param { index, default } => self.evaluate_param(code, n, *index, *default),
-            Op::Item => self.evaluate_item(code, n),
-            Op::Accumulator => self.evaluate_accumulator(code, n),
+        match &code.ops[self.store[n].op] {
+            Op::Param { index, default } => self.evaluate_param(n, *index, *default),
+            Op::Item => self.evaluate_item(n),
+            Op::Accumulator => self.evaluate_accumulator(n),
             Op::Prim { builtin, args } => {
                 let builtin = code.builtins.get(*builtin);
                 let mut deps = Deps::new();
                 let made = match self
-                    .inputs(code, frame, args, &mut deps)
+                    .inputs(frame, args, &mut deps)
                     .map(|values| self.apply_at(n, builtin, &values))
                 {
                     Ok(made) => made,
-                    Err(m) => return self.need(code, m),
+                    Err(m) => return self.need(m),
                 };
-                let made = made.map_err(|e| self.fault(code, n, e))?;
-                self.finish_call(code, n, deps, made)
+                let made = made.map_err(|e| self.fault(n, e))?;
+                self.finish_call(n, deps, made)
             }
             Op::Array(items) => {
-                if let Some(step) = self.await_plain(code, n, frame, items)? {
+                if let Some(step) = self.await_plain(n, frame, items)? {
                     return Ok(step);
                 }
                 let mut deps = Deps::new();
                 let values =
-                    items.iter().map(|o| self.plain(code, frame, *o, &mut deps).clone()).collect();
+                    items.iter().map(|o| self.plain(frame, *o, &mut deps).clone()).collect();
                 self.set_deps(n, deps);
-                self.finish_made(code, n, Value::from_elements(values))
+                self.finish_made(n, Value::from_elements(values))
             }
             Op::Record { names, values } => {
-                if let Some(step) = self.await_plain(code, n, frame, values)? {
+                if let Some(step) = self.await_plain(n, frame, values)? {
                     return Ok(step);
                 }
                 let mut deps = Deps::new();
                 let fields = names.iter().zip(values.iter());
                 let fields = fields
-                    .map(|(k, o)| (k.clone(), self.plain(code, frame, *o, &mut deps).clone()))
+                    .map(|(k, o)| (k.clone(), self.plain(frame, *o, &mut deps).clone()))
                     .collect();
                 self.set_deps(n, deps);
-                self.finish_made(code, n, Value::Record(std::sync::Arc::new(fields)))
+                self.finish_made(n, Value::Record(std::sync::Arc::new(fields)))
             }
             Op::Closure(block) => {
-                Ok(self.finish(code, n, Value::Closure(Closure { block: *block, frame })))
+                Ok(self.finish(n, Value::Closure(Closure { block: *block, frame })))
             }
             Op::Index { base, keys } => self.evaluate_index(code, n, *base, keys),
-            Op::Call { callee, args, site } => self.evaluate_call(code, n, *callee, args, *site),
-            Op::If { cond, then, otherwise } => self.evaluate_if(code, n, *cond, *then, *otherwise),
+            Op::Call { callee, args, site } => self.evaluate_call(n, *callee, args, *site),
+            Op::If { cond, then, otherwise } => self.evaluate_if(n, *cond, *then, *otherwise),
             Op::Select { cond, then, otherwise } => {
-                self.evaluate_select(code, n, *cond, *then, *otherwise)
+                self.evaluate_select(n, *cond, *then, *otherwise)
             }
-            Op::For { iter, body } => self.evaluate_for(code, n, *iter, *body),
-            Op::Map { f, over, .. } => self.evaluate_map(code, n, *f, *over),
-            Op::Fold { f, init, over, .. } => self.evaluate_fold(code, n, *f, *init, *over),
+            Op::For { iter, body } => self.evaluate_for(n, *iter, *body),
+            Op::Map { f, over, .. } => self.evaluate_map(n, *f, *over),
+            Op::Fold { f, init, over, .. } => self.evaluate_fold(n, *f, *init, *over),
             Op::Container { sources, .. } => self.evaluate_container(code, n, sources),
             Op::Gather => self.evaluate_gather(code, n),
-            Op::Mem { f, .. } => self.evaluate_mem(code, n, *f),
-            Op::Draw { dist, site, keys } => self.evaluate_draw(code, n, dist, *site, keys),
-            Op::Observe { dist, value, .. } => self.evaluate_observe(code, n, dist, *value),
-            Op::Factor { weight, .. } => self.evaluate_factor(code, n, *weight),
+            Op::Mem { f, .. } => self.evaluate_mem(n, *f),
+            Op::Draw { dist, site, keys } => self.evaluate_draw(n, dist, *site, keys),
+            Op::Observe { dist, value, .. } => self.evaluate_observe(n, dist, *value),
+            Op::Factor { weight, .. } => self.evaluate_factor(n, *weight),
             Op::Probe(p) => {
                 let value = self.score.probe(*p);
-                Ok(self.finish(code, n, Value::Num(value)))
+                Ok(self.finish(n, Value::Num(value)))
             }
         }
     }
@@ -87,13 +87,12 @@ impl Graph {
     /// Waits for operands; `None` if all are ready.
     pub(super) fn await_all(
         &mut self,
-        code: &Code,
         frame: FrameId,
         operands: &[Operand],
     ) -> Result<Option<Poll>, Failure> {
         for o in operands {
             if let Some(m) = self.unready(frame, *o) {
-                return self.need(code, m).map(Some);
+                return self.need(m).map(Some);
             }
         }
         Ok(None)
@@ -102,20 +101,19 @@ impl Graph {
     /// Waits for operands, and for the elements of those that are containers.
     pub(super) fn await_plain(
         &mut self,
-        code: &Code,
         _n: NodeId,
         frame: FrameId,
         operands: &[Operand],
     ) -> Result<Option<Poll>, Failure> {
         for o in operands {
             if let Some(m) = self.unready(frame, *o) {
-                return self.need(code, m).map(Some);
+                return self.need(m).map(Some);
             }
-            if let Value::Container(r) = self.value(code, frame, *o)
+            if let Value::Container(r) = self.value(frame, *o)
                 && self.store[r.node.gather()].state != State::Clean
             {
                 let gather = r.node.gather();
-                return self.need(code, gather).map(Some);
+                return self.need(gather).map(Some);
             }
         }
         Ok(None)
@@ -136,22 +134,16 @@ impl Graph {
     }
 
     /// Ends the evaluation of a call.
-    fn finish_call(
-        &mut self,
-        code: &Code,
-        n: NodeId,
-        deps: Deps,
-        made: Made,
-    ) -> Result<Poll, Failure> {
+    fn finish_call(&mut self, n: NodeId, deps: Deps, made: Made) -> Result<Poll, Failure> {
         match made {
             Made::Value(value) => {
                 self.set_deps(n, deps);
-                self.finish_made(code, n, value)
+                self.finish_made(n, value)
             }
             Made::Kept(before) => {
                 let value = before.value.clone();
                 self.keep(n, deps, before);
-                self.finish_made(code, n, value)
+                self.finish_made(n, value)
             }
         }
     }

@@ -14,7 +14,6 @@ use pcadlang_numerics::num::ExactSum;
 impl Graph {
     pub(super) fn evaluate_observe(
         &mut self,
-        code: &Code,
         n: NodeId,
         spec: &DistSpec,
         value: Operand,
@@ -25,9 +24,9 @@ impl Graph {
         if matches!(spec, DistSpec::Value(_)) {
             self.budget.count_large();
         }
-        let score = match self.observation_score(code, n, frame, spec, value, &mut deps) {
+        let score = match self.observation_score(n, frame, spec, value, &mut deps) {
             Ok(score) => score?,
-            Err(m) => return self.need(code, m),
+            Err(m) => return self.need(m),
         };
         let stale = self.store[n].flags & WAS_STALE != 0;
         if stale {
@@ -50,7 +49,7 @@ impl Graph {
         }
         self.set_deps(n, deps);
         self.store[n].flags &= !TARGET;
-        Ok(self.finish(code, n, Value::Unit))
+        Ok(self.finish(n, Value::Unit))
     }
 
     /// Stores the total of an observation's elements.
@@ -72,19 +71,20 @@ impl Graph {
         n: NodeId,
     ) -> Result<Option<f64>, Failure> {
         let frame = self.store[n].frame;
-        let Op::Observe { value, coarse: Some(coarse), .. } = self.op(code, n) else {
+        let Op::Observe { value, coarse: Some(coarse), .. } = self.op(n) else {
             return Ok(None);
         };
-        for o in [*value, *coarse] {
+        let (value, coarse) = (*value, *coarse);
+        for o in [value, coarse] {
             if let Some(m) = self.unready(frame, o) {
                 self.evaluate(code, m)?;
             }
         }
-        let observed = match self.replaced(code, n) {
+        let observed = match self.replaced(n) {
             Some(v) => v,
-            None => self.value(code, frame, *value),
+            None => self.value(frame, value),
         };
-        let score = match self.value(code, frame, *coarse) {
+        let score = match self.value(frame, coarse) {
             v @ Value::Likelihood(_) => likelihood_score(v, observed),
             Value::Dist(d) => density::score(d, observed).map(|s| match s {
                 Score::One(x) => x,
@@ -95,25 +95,19 @@ impl Graph {
                 v.type_name()
             ))),
         };
-        score.map(Some).map_err(|f| self.fault(code, n, f))
+        score.map(Some).map_err(|f| self.fault(n, f))
     }
 
-    pub(super) fn evaluate_factor(
-        &mut self,
-        code: &Code,
-        n: NodeId,
-        weight: Operand,
-    ) -> Result<Poll, Failure> {
+    pub(super) fn evaluate_factor(&mut self, n: NodeId, weight: Operand) -> Result<Poll, Failure> {
         let frame = self.store[n].frame;
         if let Some(m) = self.unready(frame, weight) {
-            return self.need(code, m);
+            return self.need(m);
         }
-        let score = match self.value(code, frame, weight) {
+        let score = match self.value(frame, weight) {
             Value::Num(w) if w.is_nan() => {
                 let hint =
                     "0 / 0, inf - inf and the logarithm of a negative number are NaN".to_owned();
                 return Err(self.fail(
-                    code,
                     n,
                     FaultKind::Domain,
                     "the log weight is not a number".into(),
@@ -124,7 +118,7 @@ impl Graph {
             v => {
                 let message =
                     format!("`factor` needs a log weight, a number; got {}", v.type_name());
-                return Err(self.type_error(code, n, message));
+                return Err(self.type_error(n, message));
             }
         };
         if self.store[n].flags & WAS_STALE != 0 {
@@ -132,7 +126,7 @@ impl Graph {
         }
         self.score.likelihood.add(score);
         self.store[n].score = score;
-        Ok(self.finish(code, n, Value::Unit))
+        Ok(self.finish(n, Value::Unit))
     }
 
     /// Removes an observation's or factor's score from the likelihood.

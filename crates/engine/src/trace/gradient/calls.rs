@@ -31,11 +31,11 @@ impl Reverse<'_> {
     pub(super) fn vjp_called(&mut self, n: NodeId, by: &Adjoint) -> Result<bool, Failure> {
         let g = self.graph;
         let frame = g[n].frame;
-        let Op::Call { callee: Callee::Value(f), args, .. } = g.op(self.code, n) else {
+        let Op::Call { callee: Callee::Value(f), args, .. } = g.op(n) else {
             return Ok(false);
         };
-        let Value::Builtin(i) = g.value(self.code, frame, *f) else { return Ok(false) };
-        let builtin = self.code.builtins.get(*i);
+        let Value::Builtin(i) = g.value(frame, *f) else { return Ok(false) };
+        let builtin = self.graph.code.builtins.get(*i);
         // The names were matched before, when it was called.
         let Ok(order) = builtin.match_names(args.iter().map(|(k, _)| k.as_deref())) else {
             return Ok(false);
@@ -43,9 +43,7 @@ impl Reverse<'_> {
         let operands: SmallVec<[Option<Operand>; 8]> =
             order.iter().map(|i| i.and_then(|i| args.get(i)).map(|a| a.1)).collect();
         let mut deps = Deps::new();
-        let value = |o: &Option<Operand>| {
-            o.map_or(&Value::Unit, |o| g.plain(self.code, frame, o, &mut deps))
-        };
+        let value = |o: &Option<Operand>| o.map_or(&Value::Unit, |o| g.plain(frame, o, &mut deps));
         let values: SmallVec<[&Value; 8]> = operands.iter().map(value).collect();
         let operand = |i: usize| operands.get(i).copied().flatten();
         let argument_adjoints =
@@ -58,12 +56,12 @@ impl Reverse<'_> {
     pub(super) fn vjp_mapped(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
         let g = self.graph;
         let frame = g[n].frame;
-        let Op::Map { f, over, .. } = g.op(self.code, n) else { return Ok(()) };
-        let Value::Builtin(i) = g.value(self.code, frame, *f) else {
+        let Op::Map { f, over, .. } = g.op(n) else { return Ok(()) };
+        let Value::Builtin(i) = g.value(frame, *f) else {
             return Err(self.no_derivative(n, "the result of this map"));
         };
-        let builtin = self.code.builtins.get(*i);
-        let (xs, ys) = (g.plain(self.code, frame, *over, &mut Deps::new()), &g[n].value);
+        let builtin = self.graph.code.builtins.get(*i);
+        let (xs, ys) = (g.plain(frame, *over, &mut Deps::new()), &g[n].value);
         let mut whole = Adjoint::Zero;
         for i in 0..xs.len().unwrap_or(0) {
             let (x, y, by) = match (xs, ys) {

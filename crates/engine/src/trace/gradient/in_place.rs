@@ -82,7 +82,7 @@ impl InPlace {
     /// node keeps anything else that moves.
     pub fn add_value(
         &mut self,
-        (graph, code): (&Store, &Code),
+        graph: &Store,
         n: NodeId,
         given: Given,
         form: Form,
@@ -90,7 +90,7 @@ impl InPlace {
         is_fixed: impl Fn(FrameId, Operand) -> bool,
     ) -> bool {
         let node = &graph[n];
-        let op = graph.op(code, n);
+        let op = graph.op(n);
         let fits = match node.side.as_deref() {
             None | Some(Side::Deps(_) | Side::Child(_) | Side::MemoCall(_)) => true,
             // Noise that is not given stays.
@@ -144,7 +144,7 @@ impl InPlace {
 
     /// True if [`InPlace::apply`] can move the trace to the point of the tape's last run,
     /// with choices that are summed out at these values.
-    pub fn fits(&mut self, graph: &Graph, code: &Code, tape: &Tape, values: &[usize]) -> bool {
+    pub fn fits(&mut self, graph: &Graph, tape: &Tape, values: &[usize]) -> bool {
         self.made.clear();
         self.columns.clear();
         for (given, n, form) in &self.values {
@@ -157,14 +157,14 @@ impl InPlace {
             let node = &graph.store[s.node];
             !s.applies(values)
                 || node.state != State::Clean
-                || takes_one(graph.op(code, s.node), node.side.as_deref())
+                || takes_one(graph.op(s.node), node.side.as_deref())
         };
         self.number_scores.iter().all(one)
             && self.scores.iter().filter(|(given, n, _)| holds(graph, given, *n, values)).all(
                 |(_, n, scored)| {
                     let terms = tape.terms(scored, &mut self.each, &mut self.columns);
                     let node = &graph.store[*n];
-                    match (graph.op(code, *n), node.side.as_deref(), terms) {
+                    match (graph.op(*n), node.side.as_deref(), terms) {
                         (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
                             c.scores.len() == self.each.len() && c.elements != NONE
                         }
@@ -230,7 +230,7 @@ impl InPlace {
                 continue;
             }
             if before.is_none() {
-                graph.put_scored(code, *n, &mut old.prior, &mut old.likelihood);
+                graph.put_scored(*n, &mut old.prior, &mut old.likelihood);
             }
             let terms = tape.terms(scored, &mut self.each, &mut self.columns);
             let node = &mut graph.store[*n];
@@ -255,7 +255,7 @@ impl InPlace {
                 _ => {}
             }
             if before.is_none() {
-                graph.put_scored(code, *n, &mut new.prior, &mut new.likelihood);
+                graph.put_scored(*n, &mut new.prior, &mut new.likelihood);
             }
         }
         drop(made);

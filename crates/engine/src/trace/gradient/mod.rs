@@ -24,7 +24,7 @@ use super::node::*;
 use super::store::Store;
 use super::update::Failure;
 use crate::lang::adjoint::Adjoint;
-use crate::lang::code::{Code, DistSpec, Operand};
+use crate::lang::code::{DistSpec, Operand};
 use crate::lang::error::FaultKind;
 use crate::lang::value::Value;
 use pcadlang_numerics::dist::{Datum, Dist};
@@ -47,7 +47,6 @@ enum Mark {
 /// A reverse pass.
 pub(super) struct Reverse<'a> {
     graph: &'a Store,
-    code: &'a Code,
     marks: Vec<Mark>,
     /// The active nodes, operands first.
     order: Vec<NodeId>,
@@ -69,7 +68,6 @@ impl Store {
     /// error names the operation.
     pub fn gradient(
         &self,
-        code: &Code,
         targets: &[Target],
         scored: &[NodeId],
         (power, weight): (f64, &dyn Fn(NodeId) -> f64),
@@ -81,7 +79,6 @@ impl Store {
         }
         let mut pass = Reverse {
             graph: self,
-            code,
             marks,
             order: Vec::new(),
             adjoints: FxHashMap::default(),
@@ -119,7 +116,7 @@ impl Store {
             }
             if let Some(place) = own.get_mut(&n) {
                 pass.vjp_support(n, targets, &by)?;
-                *place = self.own(code, n, by);
+                *place = self.own(n, by);
             } else if !by.is_zero() {
                 pass.vjp(n, &by)?;
             }
@@ -132,8 +129,8 @@ impl Store {
         Ok(())
     }
 
-    fn own(&self, code: &Code, n: NodeId, mut by: Adjoint) -> Option<TargetAdjoint> {
-        let (dist, stored) = (self.dist_of(code, n)?, self.stored(n)?);
+    fn own(&self, n: NodeId, mut by: Adjoint) -> Option<TargetAdjoint> {
+        let (dist, stored) = (self.dist_of(n)?, self.stored(n)?);
         if dist.is_stored_whitened() {
             // The value moves with the noise, which has its own density.
             let mut g = dist.from_noncentred_vjp(&by.numbers(stored.len()?))?;
@@ -241,8 +238,8 @@ impl<'a> Reverse<'a> {
 
     /// Returns the values of a call's arguments.
     fn values(&self, frame: FrameId, args: &[Operand]) -> SmallVec<[&'a Value; 8]> {
-        let (graph, code) = (self.graph, self.code);
-        args.iter().map(|a| graph.plain(code, frame, *a, &mut Deps::new())).collect()
+        let graph = self.graph;
+        args.iter().map(|a| graph.plain(frame, *a, &mut Deps::new())).collect()
     }
 
     fn is_active(&self, n: NodeId) -> bool {
@@ -269,7 +266,6 @@ impl<'a> Reverse<'a> {
 
     fn no_derivative(&self, n: NodeId, of: &str) -> Failure {
         self.graph.fail(
-            self.code,
             n,
             FaultKind::Type,
             format!("{of} depends on a selected choice, but its derivative is not available"),

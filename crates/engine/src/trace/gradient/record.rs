@@ -35,7 +35,7 @@ impl Graph {
             .iter()
             .filter_map(|e| if let Entry::Node { id, .. } = e { Some(*id) } else { None })
             .collect();
-        self.rollback(code, before);
+        self.rollback(before);
         self.sort_by_place(&mut all);
         all
     }
@@ -49,7 +49,7 @@ impl Graph {
         targets: &[Target],
     ) -> Option<(Tape, Option<InPlace>)> {
         let reached = self.reached(code, targets);
-        let mut r = self.recorder(code, &reached, Recorded::new(self.incremental), true);
+        let mut r = self.recorder(&reached, Recorded::new(self.incremental), true);
         for t in targets {
             r.place(*t)?;
         }
@@ -75,7 +75,7 @@ impl Graph {
         work: impl FnOnce(&mut Recorder) -> Option<()>,
     ) -> Option<Recorded> {
         let reached = self.reached(code, targets);
-        let mut r = self.recorder(code, &reached, recorded, false);
+        let mut r = self.recorder(&reached, recorded, false);
         if r.recorded.placed.is_empty() {
             for t in targets {
                 r.place(*t)?;
@@ -97,14 +97,12 @@ impl Graph {
 
     fn recorder<'a>(
         &'a self,
-        code: &'a Code,
         reached: &[NodeId],
         recorded: Recorded,
         scores: bool,
     ) -> Recorder<'a> {
         let view = Reverse {
             graph: self,
-            code,
             marks: Vec::new(),
             order: Vec::new(),
             adjoints: FxHashMap::default(),
@@ -165,8 +163,8 @@ pub(in crate::trace) struct Recorder<'a> {
 
 impl Recorder<'_> {
     fn place(&mut self, t: Target) -> Option<()> {
-        let (graph, code) = (self.view.graph, self.view.code);
-        let dist = graph.dist_of(code, t.node)?;
+        let graph = self.view.graph;
+        let dist = graph.dist_of(t.node)?;
         let whole = match self.recorded.placed.get(&t.node) {
             Some(form) => form.clone(),
             None => {
@@ -223,7 +221,7 @@ impl Recorder<'_> {
         let is_fixed = |frame, o| self.operand(frame, o).is_fixed();
         let fits = self.moving.iter().all(|n| {
             let Some(given) = given(*n) else { return false };
-            let of = (self.view.graph, self.view.code);
+            let of = self.view.graph;
             !known.insert((*n, given.clone()))
                 || in_place.add_value(of, *n, given, self.form(*n), self.besides.get(n), is_fixed)
         });
@@ -271,7 +269,7 @@ impl Recorder<'_> {
     /// Returns all nodes from which a node's value, score or structure is derived.
     fn reads(&self, n: NodeId) -> Inputs {
         let mut all = self.view.inputs(n, true);
-        self.view.graph.each_dep(self.view.code, n, |d, _| all.push(d));
+        self.view.graph.each_dep(n, |d, _| all.push(d));
         all
     }
 
@@ -286,7 +284,7 @@ impl Recorder<'_> {
     fn operand(&self, frame: FrameId, o: Operand) -> Form {
         match self.view.source(frame, o) {
             Some(n) => self.form(n),
-            None => Form::Fixed(self.view.graph.value(self.view.code, frame, o).clone()),
+            None => Form::Fixed(self.view.graph.value(frame, o).clone()),
         }
     }
 
@@ -305,14 +303,15 @@ impl Recorder<'_> {
 
     /// Records the operation of a node; `None` if that is not possible.
     fn record_op(&mut self, n: NodeId) -> Option<Form> {
-        let (graph, code) = (self.view.graph, self.view.code);
+        let graph = self.view.graph;
         let frame = graph[n].frame;
         let side = graph[n].side.as_deref();
         let now = graph[n].value.clone();
-        match graph.op(code, n) {
+        match graph.op(n) {
             Op::Prim { builtin, args } => {
                 let args = self.operands(frame, args);
-                let form = self.recorded.tape.call(code.builtins.get(*builtin), args, &now)?;
+                let form =
+                    self.recorded.tape.call(graph.code.builtins.get(*builtin), args, &now)?;
                 self.start_from_kept(n, &form);
                 Some(form)
             }
@@ -326,7 +325,7 @@ impl Recorder<'_> {
             }
             Op::Index { base, keys } => {
                 for (form, k) in self.operands(frame, keys).iter().zip(keys.iter()) {
-                    let now = graph.plain(code, frame, *k, &mut Deps::new()).clone();
+                    let now = graph.plain(frame, *k, &mut Deps::new()).clone();
                     self.recorded.tape.guard(form, &now)?;
                 }
                 match graph.resolve(frame, *base) {
@@ -338,7 +337,7 @@ impl Recorder<'_> {
                     None => Some(Form::Fixed(now)),
                 }
             }
-            Op::Param { default, .. } => match (graph.argument(code, n), self.view.passed(n)) {
+            Op::Param { default, .. } => match (graph.argument(n), self.view.passed(n)) {
                 (Some((from, o)), _) => Some(self.operand(from, o)),
                 (None, Some((source, Some(i)))) => self.form(source).position(i),
                 (None, Some((source, None))) => Some(self.form(source)),
@@ -354,10 +353,10 @@ impl Recorder<'_> {
                 if !self.operand(frame, *f).is_fixed() {
                     return None;
                 }
-                let Value::Builtin(i) = graph.value(code, frame, *f) else {
+                let Value::Builtin(i) = graph.value(frame, *f) else {
                     return self.record_call(n);
                 };
-                let builtin = code.builtins.get(*i);
+                let builtin = graph.code.builtins.get(*i);
                 let order = builtin.match_names(args.iter().map(|(k, _)| k.as_deref())).ok()?;
                 let argument = |i: &Option<usize>| match i.and_then(|i| args.get(i)) {
                     Some((_, o)) => self.operand(frame, *o),
@@ -385,8 +384,8 @@ impl Recorder<'_> {
             // Its passes are recorded one by one.
             Op::Map { .. } if matches!(side, Some(Side::Loop(_))) => Some(Form::Fixed(now)),
             Op::Map { f, over, .. } => {
-                let Value::Builtin(i) = graph.value(code, frame, *f) else { return None };
-                let (over, builtin) = (self.operand(frame, *over), code.builtins.get(*i));
+                let Value::Builtin(i) = graph.value(frame, *f) else { return None };
+                let (over, builtin) = (self.operand(frame, *over), graph.code.builtins.get(*i));
                 let one = |(i, now): (usize, Value)| {
                     self.recorded.tape.call(builtin, vec![over.position(i)?], &now)
                 };
@@ -410,7 +409,7 @@ impl Recorder<'_> {
             Op::Draw { dist, keys, .. } => self.record_draw(n, dist, keys),
             Op::Observe { .. } | Op::Factor { .. } if !self.scores => Some(Form::Fixed(now)),
             Op::Observe { dist, value, .. } => {
-                let x = match graph.replaced(code, n) {
+                let x = match graph.replaced(n) {
                     Some(v) => Form::Fixed(v.clone()),
                     None => self.operand(frame, *value),
                 };
@@ -444,7 +443,7 @@ impl Recorder<'_> {
 
     fn guard(&mut self, frame: FrameId, o: Operand) -> Option<()> {
         let form = self.operand(frame, o);
-        self.recorded.tape.guard(&form, self.view.graph.value(self.view.code, frame, o))
+        self.recorded.tape.guard(&form, self.view.graph.value(frame, o))
     }
 
     /// A call of a function of the program, whose frame is fixed.
@@ -464,9 +463,9 @@ impl Recorder<'_> {
     }
 
     fn record_draw(&mut self, n: NodeId, spec: &DistSpec, keys: &[Operand]) -> Option<Form> {
-        let (graph, code) = (self.view.graph, self.view.code);
+        let graph = self.view.graph;
         let frame = graph[n].frame;
-        let dist = graph.dist_of(code, n)?;
+        let dist = graph.dist_of(n)?;
         if dist.is_stored_whitened() != graph.is_whitened(n)
             || !self.operands(frame, keys).iter().all(Form::is_fixed)
         {
@@ -499,7 +498,7 @@ impl Recorder<'_> {
             DistSpec::Value(o) => self.operand(frame, *o),
             DistSpec::Family { builtin, args } => {
                 let args = self.operands(frame, args);
-                Builder::made_dist(code.builtins.get(*builtin), args, &dist)
+                Builder::made_dist(graph.code.builtins.get(*builtin), args, &dist)
             }
         };
         let value = self.recorded.tape.coloured(made, &dist, &x)?;
@@ -510,23 +509,24 @@ impl Recorder<'_> {
     }
 
     fn record_score(&mut self, n: NodeId, spec: &DistSpec, x: &Form, observed: bool) -> Option<()> {
-        let (graph, code) = (self.view.graph, self.view.code);
+        let graph = self.view.graph;
         let frame = graph[n].frame;
         let mark = self.recorded.tape.mark();
         match spec {
             DistSpec::Family { builtin, args } => {
-                let dist = graph.make_dist(code, n, frame, spec, &mut Deps::new()).ok()?;
+                let dist = graph.make_dist(n, frame, spec, &mut Deps::new()).ok()?;
                 let args = self.operands(frame, args);
-                self.recorded.tape.family(code.builtins.get(*builtin), args, &dist, x, observed)?;
-            }
-            DistSpec::Value(o) => {
-                let form = self.operand(frame, *o);
-                self.recorded.tape.distribution(
-                    &form,
-                    graph.value(code, frame, *o),
+                self.recorded.tape.family(
+                    graph.code.builtins.get(*builtin),
+                    args,
+                    &dist,
                     x,
                     observed,
                 )?;
+            }
+            DistSpec::Value(o) => {
+                let form = self.operand(frame, *o);
+                self.recorded.tape.distribution(&form, graph.value(frame, *o), x, observed)?;
             }
         }
         self.note_score(n, mark);

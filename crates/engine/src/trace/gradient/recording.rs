@@ -192,8 +192,8 @@ impl Recording {
         trace.rollback();
         self.here = None;
         let Some(in_place) = &mut self.in_place else { return false };
-        let moved = self.tape.run_at_images(y, here)
-            && in_place.fits(&trace.graph, &trace.code, &self.tape, &[]);
+        let moved =
+            self.tape.run_at_images(y, here) && in_place.fits(&trace.graph, &self.tape, &[]);
         if moved {
             in_place.apply(&mut trace.graph, &trace.code, &self.tape, &[], Some(&self.start));
             trace.keep_moved(&self.targets, self.tape.coarse(here));
@@ -230,7 +230,7 @@ impl Recording {
         if y.is_some()
             && let Some(in_place) = &mut self.in_place
         {
-            if !in_place.fits(&trace.graph, &trace.code, &self.tape, &drawn) {
+            if !in_place.fits(&trace.graph, &self.tape, &drawn) {
                 put_back(trace, &back, draws);
                 return false;
             }

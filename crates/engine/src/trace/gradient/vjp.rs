@@ -19,7 +19,7 @@ impl Reverse<'_> {
         let (g, mut all) = (self.graph, Inputs::new());
         let frame = g[n].frame;
         let side = g[n].side.as_deref();
-        match g.op(self.code, n) {
+        match g.op(n) {
             Op::Prim { args, .. } | Op::Array(args) => {
                 all.extend(args.iter().filter_map(|o| self.source(frame, *o)));
             }
@@ -28,7 +28,7 @@ impl Reverse<'_> {
             }
             Op::Index { .. } => all.extend(self.indexed(n).map(|(source, _)| source)),
             Op::Param { default, .. } => {
-                all.extend(match g.argument(self.code, n) {
+                all.extend(match g.argument(n) {
                     Some((from, o)) => self.source(from, o),
                     None => self
                         .passed(n)
@@ -61,7 +61,7 @@ impl Reverse<'_> {
             }
             Op::Draw { dist, .. } => {
                 let moves = |d: Dist| d.is_stored_whitened() || target && d.has_moving_support();
-                if g.dist_of(self.code, n).is_some_and(moves) {
+                if g.dist_of(n).is_some_and(moves) {
                     self.dist_inputs(n, dist, &mut all);
                 }
             }
@@ -81,9 +81,9 @@ impl Reverse<'_> {
     pub(super) fn vjp(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
         let g = self.graph;
         let frame = g[n].frame;
-        match g.op(self.code, n) {
+        match g.op(n) {
             Op::Prim { builtin, args } => {
-                let builtin = self.code.builtins.get(*builtin);
+                let builtin = self.graph.code.builtins.get(*builtin);
                 self.vjp_builtin(n, builtin, args, by)?;
             }
             Op::Array(items) => {
@@ -103,7 +103,7 @@ impl Reverse<'_> {
                     self.give_node(source, whole);
                 }
             }
-            Op::Param { default, .. } => match (g.argument(self.code, n), self.passed(n)) {
+            Op::Param { default, .. } => match (g.argument(n), self.passed(n)) {
                 (Some((from, o)), _) => self.give(from, o, by.clone()),
                 (None, Some((source, Some(i)))) => self.give_part(source, i, by),
                 (None, Some((source, None))) => self.give_node(source, by.clone()),
@@ -140,7 +140,7 @@ impl Reverse<'_> {
 
     /// Returns the alternative that a selection takes.
     pub(super) fn taken(&self, n: NodeId) -> Option<Operand> {
-        let Op::Select { then, otherwise, .. } = self.graph.op(self.code, n) else { return None };
+        let Op::Select { then, otherwise, .. } = self.graph.op(n) else { return None };
         Some(if self.graph[n].flags & OTHERWISE == 0 { *then } else { *otherwise })
     }
 
@@ -156,10 +156,8 @@ impl Reverse<'_> {
         let g = self.graph;
         let f = &g[g[n].frame];
         let slot = (n - f.base).0;
-        let element = match (&f.args, g.op(self.code, n)) {
-            (_, Op::Item) | (Arguments::Item, _) => {
-                slot == 0 || matches!(g.op(self.code, n), Op::Item)
-            }
+        let element = match (&f.args, g.op(n)) {
+            (_, Op::Item) | (Arguments::Item, _) => slot == 0 || matches!(g.op(n), Op::Item),
             (Arguments::Fold, _) if slot == 1 => true,
             (Arguments::Fold, _) if slot == 0 => {
                 return match g[n].side.as_deref() {
@@ -173,7 +171,7 @@ impl Reverse<'_> {
             return None;
         }
         let home = g[f.owner].frame;
-        let over = match g.op(self.code, f.owner) {
+        let over = match g.op(f.owner) {
             Op::For { iter, .. } => *iter,
             Op::Map { over, .. } | Op::Fold { over, .. } => *over,
             _ => return None,
@@ -186,10 +184,10 @@ impl Reverse<'_> {
     pub(super) fn indexed(&self, n: NodeId) -> Option<(NodeId, SmallVec<[Value; 2]>)> {
         let g = self.graph;
         let frame = g[n].frame;
-        let Op::Index { base, keys } = g.op(self.code, n) else { return None };
+        let Op::Index { base, keys } = g.op(n) else { return None };
         let mut gathered = Deps::new();
         let mut rest: SmallVec<[Value; 2]> =
-            keys.iter().map(|k| g.plain(self.code, frame, *k, &mut gathered).clone()).collect();
+            keys.iter().map(|k| g.plain(frame, *k, &mut gathered).clone()).collect();
         let found: &[NodeId] = match g[n].side.as_deref() {
             Some(Side::Deps(deps)) => &deps[gathered.len().min(deps.len())..],
             _ => &[],
@@ -200,7 +198,7 @@ impl Reverse<'_> {
             let Value::Container(r) = &g[source].value else { break };
             let next = *found.next()?;
             if next != r.node.gather() {
-                let width = g.key_width(self.code, r.node).min(rest.len());
+                let width = g.key_width(r.node).min(rest.len());
                 rest.drain(..width);
             }
             source = next;
@@ -243,7 +241,7 @@ impl Reverse<'_> {
 
     /// A choice stored as white noise moves with its mean and covariance.
     fn vjp_noncentred(&mut self, n: NodeId, dist: &DistSpec, by: &Adjoint) -> Result<(), Failure> {
-        let Some(d) = self.graph.dist_of(self.code, n) else { return Ok(()) };
+        let Some(d) = self.graph.dist_of(n) else { return Ok(()) };
         let Some(size) = self.graph.stored(n).and_then(|z| z.len()) else { return Ok(()) };
         // value = mean + L z
         let by = by.numbers(size);
@@ -262,8 +260,8 @@ impl Reverse<'_> {
         targets: &[Target],
         by: &Adjoint,
     ) -> Result<(), Failure> {
-        let Op::Draw { dist: spec, .. } = self.graph.op(self.code, n) else { return Ok(()) };
-        let Some(dist) = self.graph.dist_of(self.code, n) else { return Ok(()) };
+        let Op::Draw { dist: spec, .. } = self.graph.op(n) else { return Ok(()) };
+        let Some(dist) = self.graph.dist_of(n) else { return Ok(()) };
         if dist.is_stored_whitened() {
             return self.vjp_noncentred(n, spec, by);
         }

@@ -194,7 +194,7 @@ impl Trace {
                     }
                     None => {}
                 }
-                let mut reader = Reader::new(&self.graph, &self.code, &own, &mut m.partition);
+                let mut reader = Reader::new(&self.graph, &own, &mut m.partition);
                 reader.read_all(self.all_targets().iter().map(|t| t.node));
                 if strict {
                     asked.enter(&reader, self.all_targets());
@@ -241,9 +241,8 @@ impl Trace {
             Err(e) if e.is_recoverable() => {
                 let failed = std::mem::take(&mut self.graph.update.failed);
                 let new = failed.last().filter(|n| self.is_improper_draw(**n)).copied();
-                let label = Reader::new(&self.graph, &self.code, own, &mut m.partition)
-                    .read_failed(&failed);
-                self.graph.rollback(&self.code, before);
+                let label = Reader::new(&self.graph, own, &mut m.partition).read_failed(&failed);
+                self.graph.rollback(before);
                 match new {
                     Some(node) => Err(self.cannot_sum(
                         Target { node, element: NONE },
@@ -256,7 +255,7 @@ impl Trace {
             // that replaces it.
             Err(e) if e.kind == FaultKind::Duplicate => {
                 let refused = self.check_held(m.sites[0]).err();
-                self.graph.rollback(&self.code, before);
+                self.graph.rollback(before);
                 Err(refused.unwrap_or(e))
             }
             propagated => self.pend(before, propagated).map(Ok),
@@ -264,8 +263,8 @@ impl Trace {
     }
 
     fn is_improper_draw(&self, n: NodeId) -> bool {
-        matches!(self.graph.op(&self.code, n), Op::Draw { .. })
-            && self.graph.dist_of(&self.code, n).is_some_and(|d| d.is_improper())
+        matches!(self.graph.op(n), Op::Draw { .. })
+            && self.graph.dist_of(n).is_some_and(|d| d.is_improper())
     }
 
     /// Fails if a detached frame contains a held choice, or a loop around one.

@@ -179,7 +179,7 @@ impl Trace {
             self.graph.acquire(*n, *n, false);
             self.hold_frames(*n, held);
         }
-        self.graph.commit(&self.code);
+        self.graph.commit();
         held.nodes.extend(new);
         held.nodes.sort_unstable();
         let makes_observations = |f: &&FrameId| {
@@ -212,7 +212,7 @@ impl Trace {
                 held.frames.push(f);
                 held.entries.push((owner, key));
             }
-            if matches!(self.graph.op(&self.code, owner), Op::For { .. } | Op::Map { .. })
+            if matches!(self.graph.op(owner), Op::For { .. } | Op::Map { .. })
                 && !held.loops.contains(&owner)
             {
                 self.graph.acquire(owner, owner, false);

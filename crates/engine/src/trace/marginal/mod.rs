@@ -111,12 +111,11 @@ impl Trace {
     /// as far as the current state shows.
     pub fn structure_depends_on(&self, kind: ChoiceKind) -> bool {
         let selector = Selector::Kind(kind);
-        let moving =
-            self.all_targets().iter().filter(|t| self.graph.selects(&self.code, &selector, t));
+        let moving = self.all_targets().iter().filter(|t| self.graph.selects(&selector, t));
         let own = moving.map(|t| (t.node, Label { site: NONE, moves: true, set: 0 })).collect();
         let mut partition = Partition::default();
         partition.grow(1);
-        let mut reader = Reader::new(&self.graph, &self.code, &own, &mut partition);
+        let mut reader = Reader::new(&self.graph, &own, &mut partition);
         reader.read_all(std::iter::empty());
         reader.found.structure_moves
     }
@@ -126,9 +125,7 @@ impl Trace {
         if let Some(group) = elimination.reached.get(&score) {
             return Some(*group);
         }
-        if elimination.owners.is_empty()
-            || matches!(self.graph.op(&self.code, score), Op::Draw { .. })
-        {
+        if elimination.owners.is_empty() || matches!(self.graph.op(score), Op::Draw { .. }) {
             return None;
         }
         let mut n = score;
@@ -166,7 +163,7 @@ impl Trace {
         for group in &elimination.groups {
             let (mut own_prior, mut own_likelihood) = (ExactSum::default(), ExactSum::default());
             for n in &group.scores {
-                self.graph.put_scored(&self.code, *n, &mut own_prior, &mut own_likelihood);
+                self.graph.put_scored(*n, &mut own_prior, &mut own_likelihood);
             }
             group.owners.iter().for_each(|n| self.put_scores_below(*n, &mut own_likelihood));
             terms.push(tempered(&own_prior, &own_likelihood));
@@ -184,7 +181,7 @@ impl Trace {
                 let frame = &self.graph.store[f];
                 let effects = &self.code.blocks[frame.block].effects;
                 for m in effects.iter().map(|s| frame.base + *s).filter(|m| self.is_clean(*m)) {
-                    match self.graph.op(&self.code, m) {
+                    match self.graph.op(m) {
                         Op::Observe { .. } | Op::Factor { .. } => self.graph.put_score(m, to),
                         _ => open.push(m),
                     }

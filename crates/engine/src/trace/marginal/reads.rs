@@ -7,7 +7,7 @@
 //! values: a value that is equal for two values of a choice may differ for a third.
 
 use super::partition::Partition;
-use crate::lang::code::{Callee, Code, Op, Operand};
+use crate::lang::code::{Callee, Op, Operand};
 use crate::trace::gradient::Given;
 use crate::trace::node::*;
 use crate::trace::store::Store;
@@ -133,7 +133,6 @@ impl Found {
 
 pub(super) struct Reader<'a> {
     graph: &'a Store,
-    code: &'a Code,
     /// Choices that are summed out, and those that move.
     own: &'a FxHashMap<NodeId, Label>,
     partition: &'a mut Partition,
@@ -146,14 +145,13 @@ pub(super) struct Reader<'a> {
 impl<'a> Reader<'a> {
     pub fn new(
         graph: &'a Store,
-        code: &'a Code,
         own: &'a FxHashMap<NodeId, Label>,
         partition: &'a mut Partition,
     ) -> Self {
         let n = graph.len();
         let (seen, labels) = (vec![Visit::Not; n], vec![NOTHING; n]);
         let found = Found::default();
-        Reader { graph, code, own, partition, seen, labels, found, sets: None }
+        Reader { graph, own, partition, seen, labels, found, sets: None }
     }
 
     /// Returns through which of their values, given by their indices, the choices determine
@@ -174,7 +172,7 @@ impl<'a> Reader<'a> {
     /// Follows every score, and merges the groups of choices that one score reads.
     /// `choices` are those of the trace.
     pub fn read_all(&mut self, choices: impl Iterator<Item = NodeId>) {
-        for n in self.graph.clean().filter(|n| self.graph.slot_facts(self.code, *n).is_effect) {
+        for n in self.graph.clean().filter(|n| self.graph.slot_facts(*n).is_effect) {
             self.read_effect(n);
         }
         let asked = self.found.asked.len();
@@ -190,7 +188,7 @@ impl<'a> Reader<'a> {
         let (mut open, mut seen, mut found) = (self.inputs(n), FxHashSet::default(), Vec::new());
         while let Some(d) = open.pop() {
             if seen.insert(d) {
-                match self.graph.op(self.code, d) {
+                match self.graph.op(d) {
                     Op::Draw { .. } => found.push(d),
                     _ => open.extend(self.inputs(d)),
                 }
@@ -219,8 +217,7 @@ impl<'a> Reader<'a> {
     fn read_effect(&mut self, n: NodeId) {
         let read = self.visit(n);
         let (placed, owner) = self.placed(n);
-        let is_score =
-            matches!(self.graph.op(self.code, n), Op::Observe { .. } | Op::Factor { .. });
+        let is_score = matches!(self.graph.op(n), Op::Observe { .. } | Op::Factor { .. });
         let own = if is_score { read } else { self.decided(n) };
         let label = self.join(own, placed);
         if label.site != NONE {
@@ -276,7 +273,7 @@ impl<'a> Reader<'a> {
 
     /// Returns what the value of a node depends on, given what its inputs depend on.
     fn ended(&mut self, n: NodeId, read: Label) -> Label {
-        if !matches!(self.graph.op(self.code, n), Op::Draw { .. }) {
+        if !matches!(self.graph.op(n), Op::Draw { .. }) {
             let open = read.moves && !self.found.structure_moves
                 || read.site != NONE && !self.found.structure_varies;
             if open {
@@ -305,16 +302,16 @@ impl<'a> Reader<'a> {
     /// Returns all nodes that a node's value or structure is computed from.
     fn inputs(&self, n: NodeId) -> Inputs {
         let (g, mut all) = (self.graph, Inputs::new());
-        g.each_dep(self.code, n, |d, _| all.push(d));
+        g.each_dep(n, |d, _| all.push(d));
         let frame = &g[g[n].frame];
-        let of_a_pass = match g.op(self.code, n) {
+        let of_a_pass = match g.op(n) {
             Op::Item => true,
             Op::Param { .. } => matches!(frame.args, Arguments::Item | Arguments::Fold),
             _ => false,
         };
         if of_a_pass && frame.owner != NodeId::NONE {
             let home = g[frame.owner].frame;
-            g.op(self.code, frame.owner).operands(|o| all.extend(g.resolve(home, o)));
+            g.op(frame.owner).operands(|o| all.extend(g.resolve(home, o)));
             if let Some(Side::Loop(l)) = g[frame.owner].side.as_deref() {
                 all.extend(l.deps.iter().copied());
             }
@@ -325,7 +322,7 @@ impl<'a> Reader<'a> {
     /// Returns what decides which nodes a node reads, and which of them exist.
     fn decided(&mut self, n: NodeId) -> Label {
         let mut all = Inputs::new();
-        self.graph.deciders(self.code, n, |d| all.push(d));
+        self.graph.deciders(n, |d| all.push(d));
         let mut label = NOTHING;
         for d in all {
             let read = self.visit(d);
@@ -342,7 +339,7 @@ impl<'a> Reader<'a> {
         let mut owner = self.graph[self.graph[n].frame].owner;
         while owner != NodeId::NONE {
             let mut decided = self.decided(owner);
-            if matches!(self.graph.op(self.code, owner), Op::Mem { .. }) {
+            if matches!(self.graph.op(owner), Op::Mem { .. }) {
                 // Its entries exist for calls that may be anywhere, so every choice may
                 // decide.
                 self.found.anywhere = true;
@@ -352,7 +349,7 @@ impl<'a> Reader<'a> {
                 self.found.unclear |= in_memo;
                 outermost = Some(owner);
             }
-            in_memo |= matches!(self.graph.op(self.code, owner), Op::Mem { .. });
+            in_memo |= matches!(self.graph.op(owner), Op::Mem { .. });
             label = self.join(label, decided);
             owner = self.graph[self.graph[owner].frame].owner;
         }
@@ -365,14 +362,14 @@ impl<'a> Reader<'a> {
 impl Store {
     /// Calls `f` with the nodes whose values decide which other nodes a node reads, and
     /// which frames it has.
-    pub(in crate::trace) fn deciders(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId)) {
+    pub(in crate::trace) fn deciders(&self, n: NodeId, mut f: impl FnMut(NodeId)) {
         let node = &self[n];
         let mut operand = |o: &Operand| {
             if let Some(d) = self.resolve(node.frame, *o) {
                 f(d);
             }
         };
-        match self.op(code, n) {
+        match self.op(n) {
             Op::If { cond, .. } | Op::Select { cond, .. } => operand(cond),
             Op::For { iter, .. } => operand(iter),
             Op::Map { f, over, .. } | Op::Fold { f, over, .. } => {

@@ -139,7 +139,7 @@ impl Trace {
                     .into_iter()
                     .map(|n| {
                         let (mut prior, mut likelihood) = Default::default();
-                        self.graph.put_scored(&self.code, n, &mut prior, &mut likelihood);
+                        self.graph.put_scored(n, &mut prior, &mut likelihood);
                         (n, [prior.value(), likelihood.value()])
                     })
                     .collect();

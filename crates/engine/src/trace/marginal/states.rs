@@ -114,7 +114,7 @@ impl Trace {
                 let mut partition = Partition::default();
                 partition.grow(sites.targets.len());
                 let choices: Vec<NodeId> = self.all_targets().iter().map(|t| t.node).collect();
-                let mut reader = Reader::new(&self.graph, &self.code, &sites.own, &mut partition);
+                let mut reader = Reader::new(&self.graph, &sites.own, &mut partition);
                 reader.sets = Some(Sets::singletons(sites.targets.len()));
                 reader.read_all(choices.iter().copied());
                 let found = &reader.found;
@@ -177,15 +177,14 @@ impl Trace {
         scopes: &BTreeMap<NodeId, Vec<usize>>,
         choices: &[NodeId],
     ) -> Vec<(Option<NodeId>, NodeId)> {
-        let is_score = |n: &NodeId| {
-            matches!(self.graph.op(&self.code, *n), Op::Observe { .. } | Op::Factor { .. })
-        };
+        let is_score =
+            |n: &NodeId| matches!(self.graph.op(*n), Op::Observe { .. } | Op::Factor { .. });
         let mut all: Vec<NodeId> = self.graph.clean().filter(is_score).collect();
         all.extend(choices);
         all.sort_unstable();
         all.dedup();
         let factor = |n: NodeId| {
-            if matches!(self.graph.op(&self.code, n), Op::Draw { .. }) {
+            if matches!(self.graph.op(n), Op::Draw { .. }) {
                 return scopes.contains_key(&n).then_some(n);
             }
             let (mut at, mut outermost) = (n, None);

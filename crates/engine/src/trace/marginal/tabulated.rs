@@ -245,7 +245,7 @@ impl Tables {
                 Some(f) if open[*f].is_some() => &mut sums[*f],
                 _ => continue,
             };
-            trace.graph.put_scored(&trace.code, *n, prior, likelihood);
+            trace.graph.put_scored(*n, prior, likelihood);
         }
         let tempered = |[prior, likelihood]: &[ExactSum; 2]| {
             let likelihood = likelihood.value();

@@ -102,7 +102,7 @@ impl Graph {
         code: &'c Code,
         target: NodeId,
     ) -> Option<LocalDensities<'c>> {
-        let facts = self.slot_facts(code, target);
+        let facts = &code.slots[self.store[target].op];
         let finite = self.score.prior.is_fine() && self.score.likelihood.is_fine();
         if !self.incremental
             || !finite
@@ -128,12 +128,12 @@ impl Graph {
                 continue;
             }
             // An element of a container: its value is that of the choice.
-            let Op::Index { .. } = self.op(code, *m) else { return None };
+            let Op::Index { .. } = self.op(*m) else { return None };
             let Some(Side::Deps(deps)) = node.side.as_deref() else { return None };
             if deps.as_slice() != [target] {
                 return None;
             }
-            let facts = self.slot_facts(code, *m);
+            let facts = &code.slots[node.op];
             if self.is_read_outside(*m) {
                 return None;
             }
@@ -183,18 +183,18 @@ impl Store {
 
     /// Returns the distribution of a choice whose parameters are single numbers or
     /// evaluated arrays.
-    pub fn simple_dist(&self, code: &Code, n: NodeId) -> Option<Dist> {
-        let Op::Draw { dist: DistSpec::Family { builtin, args }, .. } = self.op(code, n) else {
+    pub fn simple_dist(&self, n: NodeId) -> Option<Dist> {
+        let Op::Draw { dist: DistSpec::Family { builtin, args }, .. } = self.op(n) else {
             return None;
         };
         let mut read = [Register::Num(0.0); PARAMETERS];
         let read = read.get_mut(..args.len())?;
-        let mut e = Evaluation::new(self, code, []);
-        e.base = n - self.slot_facts(code, n).slot;
+        let mut e = Evaluation::new(self, &self.code, []);
+        e.base = n - self.slot_facts(n).slot;
         for (to, o) in read.iter_mut().zip(args) {
             *to = e.read(Source::Operand(*o))?;
         }
-        family(code.builtins.get(*builtin), read)
+        family(self.code.builtins.get(*builtin), read)
     }
 }
 
@@ -311,7 +311,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
                 }
                 Instruction::Observe { slot, builtin, ref parameters, value } => {
                     let n = self.base + slot;
-                    let replaced = self.graph.replaced(self.code, n).map(Register::of);
+                    let replaced = self.graph.replaced(n).map(Register::of);
                     let observed = replaced.map_or_else(|| self.read(value), Some)?;
                     match self.log_density(builtin, parameters, observed) {
                         Some(score) => {
@@ -362,7 +362,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
             return None;
         }
         let values = self.values(operands)?;
-        let value = match self.graph.op(self.code, self.base + slot) {
+        let value = match self.graph.op(self.base + slot) {
             Op::Prim { builtin, .. } => {
                 let values: SmallVec<[&Value; 4]> = values.iter().collect();
                 self.code.builtins.get(*builtin).apply(&values).ok()?
@@ -402,14 +402,14 @@ impl<'a> Evaluation<'a, REGISTERS> {
     /// Scores an observation of any kind, as an update would.
     fn observe(&mut self, slot: Slot, parameters: &[Source], observed: Source) -> Option<()> {
         let n = self.base + slot;
-        let Op::Observe { dist, .. } = self.graph.op(self.code, n) else { return None };
+        let Op::Observe { dist, .. } = self.graph.op(n) else { return None };
         let values = self.values(parameters)?;
         let values: SmallVec<[&Value; 4]> = values.iter().collect();
-        let observed = match self.graph.replaced(self.code, n) {
+        let observed = match self.graph.replaced(n) {
             Some(value) => value.clone(),
             None => self.value(observed)?,
         };
-        let score = self.graph.score_of_values(self.code, n, dist, &values, &observed).ok()?;
+        let score = self.graph.score_of_values(n, dist, &values, &observed).ok()?;
         self.graph.take_score(n, &mut self.likelihood);
         match score {
             Score::One(score) => {
@@ -442,8 +442,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
                 .iter()
                 .filter(|other| other.operand == h.operand && is_taken(other))
                 .count();
-            let holds_nothing =
-                matches!(self.graph.op(self.code, n), Op::Item) && node.side.is_none();
+            let holds_nothing = matches!(self.graph.op(n), Op::Item) && node.side.is_none();
             node.refs as usize > now || holds_nothing
         };
         local_density.computed.iter().all(|slot| self.node(*slot).side.is_none())

@@ -24,7 +24,7 @@ impl Graph {
         code: &'c Code,
         target: Target,
     ) -> Option<(&'c StaticScaffold, u64)> {
-        let facts = self.slot_facts(code, target.node);
+        let facts = &code.slots[self.store[target.node].op];
         let scaffold = facts.scaffold.as_ref()?;
         if !self.incremental || self.store[target.node].state != State::Clean {
             return None;
@@ -36,7 +36,7 @@ impl Graph {
             let node = &self.store[m];
             // The value of a choice that is not plain may change with its parameters.
             let plain = matches!(node.value, Value::Num(_) | Value::Bool(_)) && node.side.is_none();
-            if node.state == State::Clean && self.slot_facts(code, m).is_draw && !plain {
+            if node.state == State::Clean && self.slot_facts(m).is_draw && !plain {
                 return None;
             }
         }
@@ -63,14 +63,14 @@ impl Graph {
         self.update.save(&mut self.store, n);
         self.store[n].flags |= TARGET;
         self.rerun(code, n)?;
-        let base = n - self.slot_facts(code, n).slot;
+        let base = n - self.slot_facts(n).slot;
         for (i, slot) in scaffold.slots.iter().enumerate() {
             let m = base + *slot;
-            if self.store[m].state == State::Clean && self.reads_changed(code, m) {
+            if self.store[m].state == State::Clean && self.reads_changed(m) {
                 if conditional >> i & 1 == 0 {
                     self.rerun(code, m)?;
                 } else {
-                    self.update.make_stale(&mut self.store, code, m);
+                    self.update.make_stale(&mut self.store, m);
                 }
             }
         }
@@ -85,9 +85,9 @@ impl Graph {
         self.propagate(code)
     }
 
-    fn reads_changed(&self, code: &Code, n: NodeId) -> bool {
+    fn reads_changed(&self, n: NodeId) -> bool {
         let mut changed = false;
-        self.each_dep(code, n, |d, _| {
+        self.each_dep(n, |d, _| {
             let dep = &self.store[d];
             changed |= dep.changed == self.update.epoch || dep.state == State::Stale;
         });

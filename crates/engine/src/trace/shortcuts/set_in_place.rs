@@ -108,10 +108,10 @@ impl Graph {
         let turned = self.turn(code, &following.turned, &following.fresh);
         let is_asked = |n: &NodeId| self.store[*n].state != State::Empty;
         if turned.is_none() || following.unasked.iter().any(is_asked) {
-            self.rollback(code, before);
+            self.rollback(before);
             return false;
         }
-        self.commit(code);
+        self.commit();
         true
     }
 
@@ -125,19 +125,19 @@ impl Graph {
     ) -> Option<()> {
         // Acquire before releasing: one may acquire what another releases.
         for n in selections {
-            let (taken, _) = self.ways(code, *n)?;
+            let (taken, _) = self.ways(*n)?;
             if let Some(d) = self.resolve(self.store[*n].frame, taken) {
                 self.take_up(code, d, *n, !matches!(taken, Operand::Local(_)), fresh)?;
             }
         }
         for n in selections {
-            let (_, left) = self.ways(code, *n)?;
+            let (_, left) = self.ways(*n)?;
             if let Some(d) = self.resolve(self.store[*n].frame, left) {
                 self.release(d, !matches!(left, Operand::Local(_)));
             }
             self.store[*n].flags ^= OTHERWISE;
         }
-        self.sweep(code);
+        self.sweep();
         Some(())
     }
 
@@ -151,9 +151,8 @@ impl Graph {
         fresh: &[(NodeId, Value)],
     ) -> Option<()> {
         if self.store[d].state == State::Empty {
-            let known = fresh
-                .iter()
-                .find(|(n, _)| *n == d && !matches!(self.op(code, d), Op::Select { .. }));
+            let known =
+                fresh.iter().find(|(n, _)| *n == d && !matches!(self.op(d), Op::Select { .. }));
             match known {
                 Some((_, value)) => {
                     self.update.save(&mut self.store, d);
@@ -163,7 +162,7 @@ impl Graph {
                     node.state = State::Clean;
                     node.flags |= HELD;
                     let mut read: SmallVec<[(NodeId, bool); 8]> = SmallVec::new();
-                    self.each_dep(code, d, |r, outside| read.push((r, outside)));
+                    self.each_dep(d, |r, outside| read.push((r, outside)));
                     read.into_iter()
                         .try_for_each(|(r, outside)| self.take_up(code, r, d, outside, fresh))?;
                 }
@@ -175,8 +174,8 @@ impl Graph {
     }
 
     /// Returns the alternative that a selection does not hold, and the one that it holds.
-    fn ways(&self, code: &Code, n: NodeId) -> Option<(Operand, Operand)> {
-        let Op::Select { then, otherwise, .. } = self.op(code, n) else { return None };
+    fn ways(&self, n: NodeId) -> Option<(Operand, Operand)> {
+        let Op::Select { then, otherwise, .. } = self.op(n) else { return None };
         let is_first = self.store[n].flags & OTHERWISE == 0;
         Some(if is_first { (*otherwise, *then) } else { (*then, *otherwise) })
     }

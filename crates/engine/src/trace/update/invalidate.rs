@@ -23,7 +23,7 @@ impl Update {
         }));
         self.pending.sort_by_key(|p| p.node);
         if !store.incremental {
-            self.invalidate_everything(store, code);
+            self.invalidate_everything(store);
         }
         for (t, _) in changes {
             self.save(store, t.node);
@@ -37,15 +37,15 @@ impl Update {
     /// Invalidates a choice or observation that is about to change, and everything that
     /// reads it.
     pub fn invalidate_target(&mut self, store: &mut Store, code: &Code, n: NodeId) {
-        self.make_stale(store, code, n);
+        self.make_stale(store, n);
         self.invalidate_users(store, code, n);
         self.invalidate_pending(store, code);
     }
 
     /// Invalidates every evaluated node (full re-execution).
-    pub fn invalidate_everything(&mut self, store: &mut Store, code: &Code) {
+    pub fn invalidate_everything(&mut self, store: &mut Store) {
         for n in store.clean().collect::<Vec<_>>() {
-            self.make_stale(store, code, n);
+            self.make_stale(store, n);
         }
     }
 
@@ -72,7 +72,7 @@ impl Update {
     /// Invalidates the users of a node; those that may propagate a change go onto the
     /// stack.
     fn invalidate_users(&mut self, store: &mut Store, code: &Code, n: NodeId) {
-        let facts = store.slot_facts(code, n);
+        let facts = &code.slots[store[n].op];
         for user in &facts.users {
             self.invalidate_static_user(store, code, n, n - facts.slot + *user);
         }
@@ -83,7 +83,7 @@ impl Update {
         let frame = store[n].frame;
         let owner = store[frame].owner;
         if owner != NodeId::NONE {
-            match store.op(code, owner) {
+            match store.op(owner) {
                 Op::Call { .. } | Op::If { .. } => self.invalidate(store, code, owner),
                 Op::Fold { .. } => self.invalidate_next_pass(store, code, owner, frame),
                 _ => {}
@@ -94,7 +94,7 @@ impl Update {
     /// Invalidates a user in the same frame. The change of an argument goes to the
     /// parameter it feeds, past the call itself.
     fn invalidate_static_user(&mut self, store: &mut Store, code: &Code, n: NodeId, user: NodeId) {
-        let (callee, args) = match store.op(code, user) {
+        let (callee, args) = match &code.ops[store[user].op] {
             Op::Call { callee, args, .. } => (callee, args),
             Op::Select { cond, then, otherwise } => {
                 let node = &store[user];
@@ -158,17 +158,17 @@ impl Update {
         if state != State::Clean {
             // The choice became stale before its key did.
             if matches!(state, State::Stale)
-                && matches!(store.op(code, n), Op::Draw { keys, .. } if !keys.is_empty())
-                && store.may_be_redrawn(code, n)
+                && matches!(store.op(n), Op::Draw { keys, .. } if !keys.is_empty())
+                && store.may_be_redrawn(n)
             {
                 self.stack.push(n);
             }
             return;
         }
-        self.make_stale(store, code, n);
-        match store.op(code, n) {
+        self.make_stale(store, n);
+        match store.op(n) {
             Op::Draw { .. } => {
-                if store.may_be_redrawn(code, n) {
+                if store.may_be_redrawn(n) {
                     self.stack.push(n);
                 }
             }
@@ -185,7 +185,7 @@ impl Update {
     /// changed.
     fn invalidate_items(&mut self, store: &mut Store, code: &Code, n: NodeId) {
         let Some(Side::Loop(l)) = store[n].side.as_deref() else { return };
-        let item = usize::from(matches!(store.op(code, n), Op::Fold { .. }));
+        let item = usize::from(matches!(store.op(n), Op::Fold { .. }));
         let passes = l.frames.len();
         for i in 0..passes {
             let Some(Side::Loop(l)) = store[n].side.as_deref() else { return };
@@ -200,10 +200,10 @@ impl Update {
         }
     }
 
-    pub fn make_stale(&mut self, store: &mut Store, code: &Code, n: NodeId) {
+    pub fn make_stale(&mut self, store: &mut Store, n: NodeId) {
         self.save(store, n);
         store[n].state = State::Stale;
-        let facts = store.slot_facts(code, n);
+        let facts = store.slot_facts(n);
         if facts.is_effect {
             self.stale_effects.push(n);
         } else if facts.is_draw {

@@ -11,7 +11,6 @@ use super::journal::Entry;
 use super::node::*;
 use super::propose::{Constraint, Draws, Pending};
 use super::store::Store;
-use crate::lang::code::Code;
 use crate::lang::key::Key;
 use pcadlang_numerics::dist::Datum;
 use rustc_hash::FxHashMap;
@@ -140,14 +139,14 @@ impl Update {
     }
 
     /// Makes the update permanent: clears the journal, and frees what it released.
-    pub fn commit(&mut self, store: &mut Store, code: &Code) {
+    pub fn commit(&mut self, store: &mut Store) {
         for entry in self.journal.drain(..) {
             if let Entry::Node { id, .. } = entry {
                 store[id].flags &= !SAVED;
             }
         }
-        self.detached.drain(..).for_each(|f| store.free_frame(code, f));
-        self.untidy.drain(..).rev().for_each(|n| store.tidy(code, n));
+        self.detached.drain(..).for_each(|f| store.free_frame(f));
+        self.untidy.drain(..).rev().for_each(|n| store.tidy(n));
         self.forget();
     }
 

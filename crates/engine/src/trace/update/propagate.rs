@@ -42,11 +42,8 @@ impl Graph {
                 }
                 continue;
             }
-            let unreachable = if self.update.stale_choices.is_empty() {
-                Vec::new()
-            } else {
-                self.unreachable(code)
-            };
+            let unreachable =
+                if self.update.stale_choices.is_empty() { Vec::new() } else { self.unreachable() };
             let stays = |n: &NodeId| {
                 self.store[*n].state == State::Stale && unreachable.binary_search(n).is_err()
             };
@@ -61,16 +58,16 @@ impl Graph {
                     let n = self.update.stale_choices.swap_remove(i);
                     self.run_in_place(code, n)?;
                 }
-                None => self.sweep(code),
+                None => self.sweep(),
             }
         }
-        self.sweep(code);
-        self.choices.update_selections(&self.store, &mut self.update, code)
+        self.sweep();
+        self.choices.update_selections(&self.store, &mut self.update)
     }
 
     /// Returns the nodes that a sweep would empty now, if nothing released is acquired
     /// again; sorted.
-    fn unreachable(&self, code: &Code) -> Vec<NodeId> {
+    fn unreachable(&self) -> Vec<NodeId> {
         let mut open = self.update.unheld.clone();
         open.retain(|n| self.store[*n].refs == 0);
         let (mut unreachable, mut left) = (Vec::new(), FxHashMap::<NodeId, u32>::default());
@@ -88,11 +85,11 @@ impl Graph {
                 }
             };
             if node.flags & HELD != 0 {
-                self.each_dep(code, n, |d, _| release(d));
+                self.each_dep(n, |d, _| release(d));
             }
             if let Some(Side::Child(c)) = node.side.as_deref() {
                 let frame = &self.store[c.frame];
-                code.blocks[frame.block].effects.iter().for_each(|s| release(frame.base + *s));
+                self.code.blocks[frame.block].effects.iter().for_each(|s| release(frame.base + *s));
             }
         }
         unreachable.sort_unstable();
@@ -172,11 +169,7 @@ impl Graph {
                     }
                 }
             }
-            match self
-                .budget
-                .count_operation(&self.store, code, n)
-                .and_then(|()| self.step(code, n))
-            {
+            match self.budget.count_operation(&self.store, n).and_then(|()| self.step(code, n)) {
                 Ok(Poll::Ready) => {}
                 Ok(Poll::Pending) => {}
                 Err(e) => {
@@ -190,45 +183,45 @@ impl Graph {
     }
 
     /// Pushes a node that is needed onto the stack.
-    pub fn need(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
+    pub fn need(&mut self, n: NodeId) -> Result<Poll, Failure> {
         if self.store[n].state == State::Running {
-            let message = match self.name_of(code, n) {
+            let message = match self.name_of(n) {
                 Some(name) => format!("`{name}` depends on its own value"),
                 None => "this value depends on itself".to_owned(),
             };
-            return Err(self.fail(code, n, FaultKind::Cycle, message, None));
+            return Err(self.fail(n, FaultKind::Cycle, message, None));
         }
         self.update.stack.push(n);
         Ok(Poll::Pending)
     }
 
     /// Ends the evaluation of a node with a value.
-    pub fn finish(&mut self, code: &Code, n: NodeId, value: Value) -> Poll {
+    pub fn finish(&mut self, n: NodeId, value: Value) -> Poll {
         let epoch = self.update.epoch;
         let node = &mut self.store[n];
         if node.flags & WAS_STALE == 0 || !value.same(&node.value) {
             node.value = value;
             node.changed = epoch;
         }
-        self.finish_unchanged(code, n)
+        self.finish_unchanged(n)
     }
 
     /// Ends the evaluation of a node with a newly built value, which counts towards the
     /// limits.
-    pub fn finish_made(&mut self, code: &Code, n: NodeId, value: Value) -> Result<Poll, Failure> {
-        self.budget.count_elements(&self.store, code, n, &value)?;
-        Ok(self.finish(code, n, value))
+    pub fn finish_made(&mut self, n: NodeId, value: Value) -> Result<Poll, Failure> {
+        self.budget.count_elements(&self.store, n, &value)?;
+        Ok(self.finish(n, value))
     }
 
     /// Ends the evaluation of a node whose value does not change.
-    pub fn finish_unchanged(&mut self, code: &Code, n: NodeId) -> Poll {
+    pub fn finish_unchanged(&mut self, n: NodeId) -> Poll {
         let node = &mut self.store[n];
         node.state = State::Clean;
         node.flags &= !WAS_STALE;
         if node.flags & HELD == 0 {
             node.flags |= HELD;
             let mut deps: SmallVec<[(NodeId, bool); 8]> = SmallVec::new();
-            self.each_dep(code, n, |d, outside| deps.push((d, outside)));
+            self.each_dep(n, |d, outside| deps.push((d, outside)));
             for (d, outside) in deps {
                 self.acquire(d, n, outside);
             }
@@ -283,7 +276,7 @@ impl Graph {
             let mut changed = false;
             let mut wait = NodeId::NONE;
             let epoch = self.update.epoch;
-            self.each_dep(code, n, |d, _| {
+            self.each_dep(n, |d, _| {
                 let dep = &self.store[d];
                 if !changed && wait == NodeId::NONE {
                     if dep.state != State::Clean {
@@ -295,14 +288,14 @@ impl Graph {
             });
             if !changed {
                 if wait != NodeId::NONE {
-                    return self.need(code, wait);
+                    return self.need(wait);
                 }
                 // Elements of passes also read their owner, and targets their pending
                 // change.
-                let op = self.op(code, n);
+                let op = self.op(n);
                 let reads_more = matches!(op, Op::Item | Op::Accumulator | Op::Param { .. });
                 if !reads_more && self.store[n].flags & TARGET == 0 {
-                    return Ok(self.finish_unchanged(code, n));
+                    return Ok(self.finish_unchanged(n));
                 }
             }
         }
