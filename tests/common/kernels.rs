@@ -60,7 +60,6 @@ pub mod exact {
         "smc(drift(@x, scale = 1), particles = 40)",
         "smc(mh(one(@**)), particles = 20)",
         "abc(mh(@p), eps = 0.5)",
-        "abc(mh(@p), eps = 0.5, particles = 10, moves = 2)",
     ];
     pub const DEPENDENT_SUPPORT: &[&str] =
         &["mh(one(@**))", "block(@**)", "drift(@**)", "drift(one(@**))"];

@@ -40,12 +40,10 @@ enum Of {
     /// (`hamiltonian/memory.rs`), which affects how a density is computed, not which
     /// density.
     Trajectory,
-    /// `optimize`: nothing, since its state is only how often tapes are recorded.
-    Nothing,
     /// `temper`: all except the replicas, which are states of the larger chain, and the
     /// count of steps, which determines the pairs whose turn it is.
     Ladder(&'static Of),
-    /// `smc`, and `abc` with particles: all except the log density and estimate of the
+    /// `smc`: all except the log density and estimate of the
     /// accepted state, which belong to that state, and the sum of estimates, which is a
     /// result.
     Particles(&'static Of),
@@ -82,8 +80,6 @@ const CASES: &[(&str, &str, &str, Of)] = &[
     ),
     ("smc", MODEL, "smc(drift(one(@**)), particles = 5);", Of::Particles(&Of::All)),
     ("abc", COUNTS, "abc(drift(@p), eps = 0.5);", Of::Distance(&Of::All)),
-    ("abc", COUNTS, "abc(drift(@p), eps = 0.5, particles = 6);", Of::Particles(&Of::All)),
-    ("optimize", MODEL, "optimize(@a + @b, steps = 2);", Of::Nothing),
     ("modes", MODEL, "modes(@**, tries = 20, keep = 4, steps = 10); mh(one(@**));", Of::All),
     ("shift", MODEL, "shift(0.5);", Of::All),
     ("mirror", MODEL, "mirror();", Of::All),
@@ -126,7 +122,6 @@ fn learnt(of: Of, state: &[u8]) -> Vec<Vec<u8>> {
     match of {
         Of::All => vec![state.to_vec()],
         Of::Trajectory => vec![whole(&parts(2)[0])],
-        Of::Nothing => vec![],
         Of::Ladder(inner) => {
             let [kernels, _replicas, gaps, _rounds] = &parts(4)[..] else { unreachable!() };
             let kernels =

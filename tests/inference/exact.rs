@@ -425,24 +425,6 @@ fn replica_exchange_weighs_modes_that_are_far_apart() {
     assert!((mean(&plain["x < 0"]) - 0.3).abs() > 0.1, "a plain chain stays where it is");
 }
 
-/// Optimisation ends at the highest density; for a normal posterior, this is its mean.
-#[test]
-fn optimize_finds_the_mode() {
-    let d = run(
-        "assume a ~ normal(0, 1); assume b ~ normal(a, 0.1); observe normal(a + 3 * b, 0.5) = 2;
-         infer { repeat 1 { optimize(@**); collect a, b; } }",
-        1,
-        1,
-    );
-    // The mode of exp(-(a^2 + (b - a)^2 / 0.01 + (a + 3 b - 2)^2 / 0.25) / 2) by solving
-    // its two linear equations.
-    let (p, q, r) = (1.0 + 100.0 + 4.0, -100.0 + 12.0, 100.0 + 36.0);
-    let (u, v) = (8.0, 24.0);
-    let det = p * r - q * q;
-    assert!((d["a"][0] - (u * r - q * v) / det).abs() < 1e-5, "{}", d["a"][0]);
-    assert!((d["b"][0] - (p * v - q * u) / det).abs() < 1e-5, "{}", d["b"][0]);
-}
-
 /// Two modes of different weights: a search finds both, and jumps between them leave the
 /// posterior invariant. So does a search by a surrogate that sees neither mode (it has to
 /// depend on the choice, since a choice that nothing depends on does not exist).

@@ -52,7 +52,6 @@ fn every_kernel() {
         "mala(@a + @z); nuts(@a + @z); gibbs(one($finite));",
         "nuts($continuous, max_depth = 4); gibbs(each($finite));",
         "nuts(@a, marginal = @k); mh(one(@**));",
-        "optimize(@a + @b, steps = 2); mh(one(@**));",
         "temper(drift(one(@**)), levels = 3);",
         "temper(nuts(@a + @b + @z, max_depth = 3), levels = 3); mh(one(@**));",
         "smc(drift(one(@**)), particles = 5);",
@@ -73,9 +72,8 @@ fn without_likelihoods() {
              infer {{ repeat 30 {{ {kernel} }} }}"
         )
     };
-    for kernel in ["abc(mh(@p), eps = 0.5);", "abc(mh(@p), eps = 0.5, particles = 6);"] {
-        same_after_breaks(kernel, &of_text(&text(kernel)), &options(30, 0), 30);
-    }
+    let kernel = "abc(mh(@p), eps = 0.5);";
+    same_after_breaks(kernel, &of_text(&text(kernel)), &options(30, 0), 30);
 }
 
 #[test]

@@ -50,9 +50,7 @@ pub use init::attempts;
 pub use init::{NoStart, Start, StartError, starts};
 pub use kernel::accepts;
 pub use kernel::{Kernel, Outcome, Pick, SiteSelection, StepContext, decide, recoverable};
-pub use kernels::{
-    Abc, AbcSmc, Delayed, Hamiltonian, Hmc, Independent, Knn, Nuts, Optimize, Smc, Temper, table,
-};
+pub use kernels::{Abc, Delayed, Hamiltonian, Hmc, Knn, Nuts, Smc, Temper, table};
 pub use kernels::{Block, Drift, Elliptical, Exact, Gibbs, Mh, Slice};
 pub use neighbours::{Banks, Latent, Latents, Neighbours};
 pub use pause::Pause;

@@ -40,7 +40,6 @@ const KERNELS: &[&str] = &[
     "slice(@x, doubling = true)",
     "temper(drift(@x), levels = 3)",
     "smc(drift(@x, scale = 1), particles = 8)",
-    "optimize(@x)",
     "delayed(drift(@x), @y)",
     "wide()",
     "scaled()",

@@ -93,9 +93,6 @@ pub struct LocalDensity {
     pub sources: Box<[Source]>,
     /// The computations that depend on the value; other blocks must not read them.
     pub computations: Box<[Slot]>,
-    /// The registers that contain the results of computations, once computed: of
-    /// `computations`, and of those that alternatives need.
-    pub results: Box<[(Slot, u8)]>,
     /// What the alternatives of its selections hold. When a selection switches, it must
     /// be kept by other holders.
     pub held: Box<[KeptAlternative]>,
@@ -123,7 +120,6 @@ impl LocalDensity {
             known: vec![None; ops.len()],
             registers: 1,
             inside: false,
-            results: Vec::new(),
             held: Vec::new(),
             computed: Vec::new(),
         };
@@ -133,7 +129,7 @@ impl LocalDensity {
         let (scores, computations): (Vec<Slot>, Vec<Slot>) =
             dependents.into_iter().partition(is_score);
         scores.into_iter().try_for_each(|slot| compiler.score(slot))?;
-        let Compiler { instructions, sources, results, mut held, computed, .. } = compiler;
+        let Compiler { instructions, sources, mut held, computed, .. } = compiler;
         let operands: Vec<Operand> = held.iter().map(|h| h.operand).collect();
         held.iter_mut()
             .for_each(|h| h.times = operands.iter().filter(|o| **o == h.operand).count() as u32);
@@ -141,7 +137,6 @@ impl LocalDensity {
             instructions: instructions.into(),
             sources: sources.into(),
             computations: computations.into(),
-            results: results.into(),
             held: held.into(),
             computed: computed.into(),
         })
@@ -162,7 +157,6 @@ struct Compiler<'a> {
     /// Whether the next instruction is inside an alternative, so that what it reads may
     /// not be evaluated.
     inside: bool,
-    results: Vec<(Slot, u8)>,
     held: Vec<KeptAlternative>,
     computed: Vec<Slot>,
 }
@@ -226,7 +220,6 @@ impl Compiler<'_> {
         if self.dependent[slot] {
             let r = self.compute(slot)?;
             self.known[slot] = Some(r);
-            self.results.push((slot, r));
             return Some(Source::Register(r));
         }
         if !self.inside || !self.is_computed(slot) {
@@ -240,7 +233,6 @@ impl Compiler<'_> {
         self.known = known;
         self.land(recall);
         self.known[slot] = Some(into);
-        self.results.push((slot, into));
         Some(Source::Register(into))
     }
 

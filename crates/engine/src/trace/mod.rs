@@ -188,21 +188,8 @@ impl Trace {
         self.graph.update.draws = draws;
         self.graph.update.constraints.extend(constraints.iter().cloned());
         self.put_observed(observed);
-        let scaffold = match changes {
-            [(target, change)] if observed.is_empty() => {
-                self.graph.scaffold_of(&self.code, *target).map(|s| (*target, change, s))
-            }
-            _ => None,
-        };
-        let propagated = match scaffold {
-            Some((target, change, scaffold)) => {
-                self.graph.update_along_scaffold(&self.code, target, change, scaffold)
-            }
-            None => {
-                self.graph.update.queue(&mut self.graph.store, &self.code, changes);
-                self.graph.propagate(&self.code)
-            }
-        };
+        self.graph.update.queue(&mut self.graph.store, &self.code, changes);
+        let propagated = self.graph.propagate(&self.code);
         self.graph.update.constraints.clear();
         self.pend(before, propagated)
     }

@@ -109,7 +109,7 @@ impl Trace {
                 matches!(spec, DistSpec::Value(o) if !matches!(g.value(frame, *o), Value::Dist(_)));
             let scores = match likelihood {
                 true => vec![self.score_at(n)],
-                false => match g.make_dist(n, frame, spec, &mut deps) {
+                false => match g.make_dist(n, spec, &mut deps) {
                     Ok(dist) => pointwise(&dist, observed),
                     Err(_) => vec![f64::NAN],
                 },

@@ -49,8 +49,7 @@ impl Store {
         if let Some(simple) = self.simple_dist(n) {
             return Some(simple);
         }
-        let frame = self[n].frame;
-        self.make_dist(n, frame, dist, &mut Deps::new()).ok()
+        self.make_dist(n, dist, &mut Deps::new()).ok()
     }
 
     fn tags(&self, n: NodeId) -> Vec<(Arc<str>, Option<Key>)> {
@@ -110,11 +109,10 @@ impl Store {
     pub(crate) fn make_dist(
         &self,
         n: NodeId,
-        frame: FrameId,
         spec: &DistSpec,
         deps: &mut Deps,
     ) -> Result<Dist, Failure> {
-        match self.dist_now(n, frame, spec, deps) {
+        match self.dist_now(n, spec, deps) {
             Ok(dist) => dist,
             Err(_) => Err(self.type_error(n, "its parameters are not evaluated".into())),
         }
@@ -124,11 +122,10 @@ impl Store {
     pub(crate) fn dist_now(
         &self,
         n: NodeId,
-        frame: FrameId,
         spec: &DistSpec,
         deps: &mut Deps,
     ) -> Result<Result<Dist, Failure>, NodeId> {
-        let values = self.inputs(frame, spec.operands(), deps)?;
+        let values = self.inputs(self[n].frame, spec.operands(), deps)?;
         Ok(self.dist_of_values(n, spec, &values))
     }
 
@@ -198,15 +195,14 @@ impl Store {
     pub fn observation_score(
         &self,
         n: NodeId,
-        frame: FrameId,
         spec: &DistSpec,
         value: Operand,
         deps: &mut Deps,
     ) -> Result<Result<Score, Failure>, NodeId> {
-        let values = self.inputs(frame, spec.operands(), deps)?;
+        let values = self.inputs(self[n].frame, spec.operands(), deps)?;
         let observed = match self.replaced(n) {
             Some(v) => v,
-            None => self.inputs(frame, &[value], deps)?[0],
+            None => self.inputs(self[n].frame, &[value], deps)?[0],
         };
         Ok(self.score_of_values(n, spec, &values, observed))
     }
@@ -312,7 +308,7 @@ impl Store {
         {
             return None;
         }
-        let dist = self.make_dist(n, frame, spec, &mut deps).ok()?;
+        let dist = self.make_dist(n, spec, &mut deps).ok()?;
         let count =
             dist.elements().or_else(|| observed.len().filter(|_| is_repeated(&dist, observed)));
         let Some(count) = count else { return outside(&dist, observed) };
@@ -339,7 +335,7 @@ impl Store {
                 None => Ok(Err(format!("the likelihood `{}`", l.name()))),
             };
         }
-        let dist = self.make_dist(n, frame, spec, &mut deps)?;
+        let dist = self.make_dist(n, spec, &mut deps)?;
         if dist.is_improper() {
             return Ok(Err(format!("the improper distribution `{}`", dist.name())));
         }

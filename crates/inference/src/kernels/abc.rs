@@ -8,8 +8,7 @@
 //! the observed data: the posterior, as `eps` goes to 0. The distance is the root mean
 //! square of the differences between the observed and the simulated numbers.
 
-use super::AbcSmc;
-use super::row::{Built, INNER, KernelRow, Type, arg, number, opt};
+use super::row::{Built, INNER, KernelRow, Type, arg, number};
 use crate::calls::error::fail;
 use crate::kernel::{Kernel, Outcome, StepContext};
 use crate::state::{StateError, pack, unpack};
@@ -21,18 +20,7 @@ use std::sync::Arc;
 
 pub(crate) const ROW: KernelRow = KernelRow::new(
     "abc",
-    &[
-        INNER,
-        arg("eps", Type::Num, "The tolerance: the largest accepted distance."),
-        opt(
-            "particles",
-            Type::Int,
-            "none",
-            "With this many particles, each step draws a complete state as `smc` does, with \
-             tolerances decreasing to `eps` (Del Moral et al. 2012).",
-        ),
-        opt("moves", Type::Int, "1", "The number of moves of each particle at each tolerance."),
-    ],
+    &[INNER, arg("eps", Type::Num, "The tolerance: the largest accepted distance.")],
     "Approximate Bayesian computation (likelihood-free): the inner kernel targets the prior, \
      and a proposal is accepted if data simulated from it are within `eps` of the observed \
      data in root mean square (Marjoram et al. 2003).",
@@ -40,14 +28,8 @@ pub(crate) const ROW: KernelRow = KernelRow::new(
     |call| {
         let inner = call.inner()?;
         let eps = call.positive(1)?.unwrap_or(f64::INFINITY);
-        if call.value(2)?.is_none() {
-            let signature = format!("abc({}, {eps})", inner.signature);
-            return Ok(Built::new(Abc::new(inner.kernel, eps, call.span()), signature));
-        }
-        let (particles, moves) = (call.whole(2, 100, 2, 1_000_000)?, call.whole(3, 1, 1, 10_000)?);
-        let signature = format!("abc({}, {eps}, {particles}, {moves})", inner.signature);
-        let (size, frozen) = ((particles as usize, moves), call.frozen());
-        Ok(Built::new(AbcSmc::new(inner.kernel, eps, size, frozen, call.span()), signature))
+        let signature = format!("abc({}, {eps})", inner.signature);
+        Ok(Built::new(Abc::new(inner.kernel, eps, call.span()), signature))
     },
 )
 .irreversible();
@@ -76,35 +58,8 @@ impl Abc {
     }
 }
 
-/// Makes one step of the inner kernel under the prior, and keeps it if data simulated in
-/// the new state are within `eps`; `distance` is that of the present state.
-pub(super) fn step_within(
-    kernel: &mut dyn Kernel,
-    trace: &mut Trace,
-    at: &StepContext,
-    (distance, eps): (&mut f64, f64),
-    span: Span,
-) -> TraceResult<Outcome> {
-    if kernel.sweep(trace, None).is_some() {
-        return Err(fail(span, "abc takes a kernel that makes a single step, not each(…)".into()));
-    }
-    let before = trace.constraints();
-    let inner = kernel.step(trace, &StepContext { power: 0.0, ..at.within(0) })?;
-    if inner.accepted == 0 && *distance <= eps {
-        return Ok(Outcome::one(false));
-    }
-    let new = simulate(trace, at.within(1).draws(0), span)?;
-    let near = new <= eps;
-    if near {
-        *distance = new;
-    } else {
-        trace.restore(&before, at.within(2).draws(0))?;
-    }
-    Ok(Outcome { accepted: u32::from(near), proposals: 1, ..inner })
-}
-
 /// Returns the distance between data simulated in this state and the observed data.
-pub(super) fn simulate(trace: &Trace, draws: Draws, span: Span) -> TraceResult<f64> {
+fn simulate(trace: &Trace, draws: Draws, span: Span) -> TraceResult<f64> {
     let replicate = trace.replicate(draws)?;
     if let Some((address, what)) = replicate.silent.first() {
         return Err(fail(
@@ -176,8 +131,24 @@ impl Kernel for Abc {
             };
             self.observed = Some(Arc::clone(trace.replacements()));
         }
+        if self.kernel.sweep(trace, None).is_some() {
+            let message = "abc takes a kernel that makes a single step, not each(…)";
+            return Err(fail(self.span, message.into()));
+        }
         // Until a state is close enough, any closer one is accepted.
         let eps = if self.distance > self.eps { self.distance } else { self.eps };
-        step_within(&mut *self.kernel, trace, at, (&mut self.distance, eps), self.span)
+        let before = trace.constraints();
+        let inner = self.kernel.step(trace, &StepContext { power: 0.0, ..at.within(0) })?;
+        if inner.accepted == 0 && self.distance <= eps {
+            return Ok(Outcome::one(false));
+        }
+        let new = simulate(trace, at.within(1).draws(0), self.span)?;
+        let near = new <= eps;
+        if near {
+            self.distance = new;
+        } else {
+            trace.restore(&before, at.within(2).draws(0))?;
+        }
+        Ok(Outcome { accepted: u32::from(near), proposals: 1, ..inner })
     }
 }

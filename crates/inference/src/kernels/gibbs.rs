@@ -148,10 +148,6 @@ impl Kernel for Gibbs {
             trace.rollback();
             return Ok(outcome);
         }
-        if !forward.structural && trace.set_in_place(target, &dist, &self.values[chosen]) {
-            outcome.accepted = 1;
-            return Ok(outcome);
-        }
         if forward.pending != Some(chosen) {
             let change = [(target, Change::Set(self.values[chosen].clone()))];
             // The same substream gives the same draws as when the value was weighed.

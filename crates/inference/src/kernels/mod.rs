@@ -1,7 +1,6 @@
 //! The kernels, one per file, and their list.
 
 mod abc;
-mod abc_smc;
 mod block;
 mod delayed;
 mod drift;
@@ -12,7 +11,6 @@ mod hamiltonian;
 mod involution;
 mod knn;
 mod mh;
-mod particles;
 mod program_kernel;
 mod row;
 mod shape;
@@ -21,24 +19,22 @@ mod smc;
 mod temper;
 
 pub use abc::Abc;
-pub use abc_smc::AbcSmc;
 pub use block::Block;
 pub use delayed::Delayed;
 pub use drift::Drift;
 pub use elliptical::Elliptical;
 pub use exact::Exact;
 pub use gibbs::Gibbs;
-pub use hamiltonian::{Hamiltonian, Hmc, Nuts, Optimize};
+pub use hamiltonian::{Hamiltonian, Hmc, Nuts};
 pub use knn::Knn;
 pub use mh::Mh;
-pub use particles::Independent;
 pub(crate) use program_kernel::ProgramKernel;
 pub use slice::Slice;
 pub use smc::Smc;
 pub use temper::Temper;
 
 pub(crate) use hamiltonian::approach;
-use hamiltonian::{hmc, mala, modes, nuts, optimize};
+use hamiltonian::{hmc, mala, modes, nuts};
 use pcadlang_engine::lang::builtins::{Builtin, Table};
 use row::KernelRow;
 
@@ -60,7 +56,6 @@ const ROWS: &[KernelRow] = &[
     smc::ROW,
     abc::ROW,
     modes::ROW,
-    optimize::ROW,
 ];
 
 /// The built-ins of the language, kernels included.

@@ -10,14 +10,17 @@
 //! first run, such that the effective sample size is half the number of particles at
 //! each, and are fixed from then on.
 
-use super::particles::{Independent, ParticlePath, Prior};
 use super::row::{Built, INNER, KernelRow, Type, number, opt};
-use crate::kernel::{Kernel, StepContext, inner_step};
+use crate::calls::error::fail;
+use crate::kernel::{Kernel, Outcome, StepContext, accepts, inner_step};
 use crate::resampling::systematic;
 use crate::state::{StateError, holds, pack, unpack};
-use pcadlang_engine::trace::{Selector, Trace, TraceResult};
+use pcadlang_engine::lang::code::Observed;
+use pcadlang_engine::trace::{Constraint, Selector, Trace, TraceResult};
 use pcadlang_numerics::num::log_sum_exp;
+use pcadlang_numerics::rng::Stream;
 use pcadlang_syntax::span::Span;
+use std::sync::Arc;
 
 pub(crate) const ROW: KernelRow = KernelRow::new(
     "smc",
@@ -44,55 +47,94 @@ const MOST_POWERS: usize = 1000;
 /// relative to it.
 const LARGE: f64 = 1e9;
 
-/// Particle independent Metropolis-Hastings with annealed particles.
-pub type Smc = Independent<Annealed>;
+/// No estimates so far.
+const NO_ESTIMATES: (u64, f64) = (0, f64::NEG_INFINITY);
 
-/// Raises the power of the likelihood from 0 to 1.
-pub struct Annealed {
+/// Proposes complete states, accepted with the ratio of the evidence estimates that they
+/// come with.
+pub struct Smc {
     kernel: Box<dyn Kernel>,
     particles: usize,
+    /// Choices that are not redrawn.
+    frozen: Selector,
+    span: Span,
     /// The powers of the likelihood, of which the last is 1; chosen in the first run.
     powers: Vec<f64>,
+    /// The last accepted state: its log joint density and the log of its evidence
+    /// estimate.
+    accepted: Option<(f64, f64)>,
+    /// The data observed then.
+    observed: Option<Arc<Observed>>,
+    /// Whether the state comes from a checkpoint; it then refers to the data that the
+    /// trace observes at the next step.
+    loaded: bool,
+    /// The number of estimates, and the log of their sum.
+    estimates: (u64, f64),
 }
 
 impl Smc {
     /// `particles` particles, moved by a kernel; frozen choices are not redrawn. `span`
     /// is the position that errors refer to.
     pub fn new(kernel: Box<dyn Kernel>, particles: usize, frozen: Selector, span: Span) -> Self {
-        Independent::by(Annealed { kernel, particles, powers: Vec::new() }, frozen, span)
-    }
-}
-
-impl ParticlePath for Annealed {
-    fn name(&self) -> &'static str {
-        "smc"
-    }
-
-    fn forget(&mut self) {
-        self.powers.clear();
-    }
-
-    fn save(&self, trace: &Trace) -> Vec<u8> {
-        pack(&(self.kernel.save(trace), &self.powers))
+        Smc {
+            kernel,
+            particles,
+            frozen,
+            span,
+            powers: Vec::new(),
+            accepted: None,
+            observed: None,
+            loaded: false,
+            estimates: NO_ESTIMATES,
+        }
     }
 
-    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
-        let (inner, powers): (Vec<u8>, Vec<f64>) = unpack(state)?;
-        holds(
-            powers.iter().all(|p| *p > 0.0) && powers.last().is_none_or(|p| *p == 1.0),
-            self.name(),
-        )?;
-        self.powers = powers;
-        self.kernel.load(&inner)
+    /// Begins a step. The first of all, and the first with other data, start estimates and
+    /// powers again.
+    ///
+    /// # Errors
+    /// If the state is not the one that was last accepted.
+    fn begin(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<()> {
+        trace.rollback();
+        if std::mem::take(&mut self.loaded) {
+            self.observed = Some(Arc::clone(trace.replacements()));
+        }
+        if !self.observed.as_ref().is_some_and(|o| Arc::ptr_eq(o, trace.replacements())) {
+            self.observed = Some(Arc::clone(trace.replacements()));
+            self.accepted = None;
+            self.estimates = NO_ESTIMATES;
+            self.powers.clear();
+            return Ok(());
+        }
+        if let Some((log_joint, _)) = self.accepted
+            && log_joint.to_bits() != trace.log_joint().to_bits()
+            && !at.adapting
+        {
+            let message = "another kernel changed the state between two steps of smc";
+            let mut e = fail(self.span, message.into());
+            let hint = "smc draws complete states; its evidence estimate is valid only for the state it drew";
+            e.hint = Some(hint.into());
+            return Err(e);
+        }
+        Ok(())
     }
 
-    fn lead(
-        &mut self,
-        prior: &Prior,
-        trace: &mut Trace,
-        at: &StepContext,
-    ) -> TraceResult<(Vec<Trace>, f64)> {
-        let mut particles = prior.draw(trace, self.particles, at)?;
+    /// Draws particles from the prior; frozen choices keep their values.
+    fn draw_from_prior(&self, trace: &mut Trace, at: &StepContext) -> TraceResult<Vec<Trace>> {
+        let selection = trace.select(&self.frozen);
+        let fixed: Vec<(u64, Constraint)> = trace
+            .targets(selection)
+            .iter()
+            .filter_map(|t| Some((trace.address_hash(*t), Constraint::Stored(trace.stored(*t)?))))
+            .collect();
+        let one = |i: usize| trace.another(fixed.iter().cloned(), at.within(i as u64).draws(0));
+        (0..self.particles).map(one).collect()
+    }
+
+    /// Draws particles and moves them to the posterior. Returns them and the log of the
+    /// evidence estimate.
+    fn anneal(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<(Vec<Trace>, f64)> {
+        let mut particles = self.draw_from_prior(trace, at)?;
         let find = self.powers.is_empty();
         let (mut power, mut log_evidence, mut rung) = (0.0, 0.0, 0);
         while power < 1.0 {
@@ -130,6 +172,71 @@ impl ParticlePath for Annealed {
             }
         }
         Ok((particles, log_evidence))
+    }
+
+    /// Accepts one of the particles as the new state, or rejects.
+    fn decide(
+        &mut self,
+        trace: &mut Trace,
+        mut particles: Vec<Trace>,
+        log_evidence: f64,
+        rng: &mut Stream,
+    ) -> Outcome {
+        let one = rng.index(particles.len());
+        let (count, log_sum) = self.estimates;
+        self.estimates = (count.saturating_add(1), log_sum_exp(&[log_sum, log_evidence]));
+        let ratio = match self.accepted {
+            Some((_, old)) => log_evidence - old,
+            // The first state is accepted, as an initial state.
+            None if log_evidence > f64::NEG_INFINITY => 0.0,
+            None => f64::NEG_INFINITY,
+        };
+        let accepted = accepts(ratio, rng);
+        if accepted {
+            *trace = particles.swap_remove(one);
+            self.accepted = Some((trace.log_joint(), log_evidence));
+            self.observed = Some(Arc::clone(trace.replacements()));
+        }
+        Outcome::one(accepted)
+    }
+}
+
+impl Kernel for Smc {
+    fn name(&self) -> String {
+        "smc".into()
+    }
+
+    fn save(&self, trace: &Trace) -> Vec<u8> {
+        let begun = self.loaded || self.observed.is_some();
+        pack(&(
+            pack(&(self.kernel.save(trace), &self.powers)),
+            self.accepted,
+            begun,
+            self.estimates,
+        ))
+    }
+
+    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
+        let annealed: Vec<u8>;
+        (annealed, self.accepted, self.loaded, self.estimates) = unpack(state)?;
+        self.observed = None;
+        let (inner, powers): (Vec<u8>, Vec<f64>) = unpack(&annealed)?;
+        let possible = powers.iter().all(|p| *p > 0.0) && powers.last().is_none_or(|p| *p == 1.0);
+        holds(possible, "smc")?;
+        self.powers = powers;
+        self.kernel.load(&inner)
+    }
+
+    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
+        self.begin(trace, at)?;
+        let (particles, log_evidence) = self.anneal(trace, at)?;
+        Ok(self.decide(trace, particles, log_evidence, &mut at.stream()))
+    }
+
+    /// The log of the mean of all estimates.
+    fn log_evidence(&self) -> Option<f64> {
+        let (n, log_sum) = self.estimates;
+        (n > 0).then(|| log_sum - libm::log(n as f64))
     }
 }
 

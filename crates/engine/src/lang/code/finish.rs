@@ -3,7 +3,7 @@
 use super::op::{Callee, Op, Operand};
 use super::program::{Block, Code, Eager};
 use super::slots::SlotFacts;
-use super::{flatten, scaffold};
+use super::{dependents::dependents, flatten};
 use crate::lang::ids::OpId;
 use crate::lang::local_density::LocalDensity;
 use crate::lang::value::Value;
@@ -43,30 +43,22 @@ impl Code {
                     is_result: block.result == Some(Operand::Local(slot)),
                     reads: op.reads(),
                     users: users.into(),
-                    scaffold: None,
                     local_density: None,
                 });
                 self.ops.push(op);
             }
             let (ops, slots) =
                 (&self.ops[block.first.index()..], &self.slots[block.first.index()..]);
-            let asked = scaffold::always_asked(ops, slots);
             let found: Vec<_> = block
                 .slots()
                 .filter(|s| matches!(ops[*s], Op::Draw { .. } | Op::Index { .. }))
                 .filter_map(|s| {
-                    let dependents = scaffold::dependents(ops, slots, s)?;
-                    let scaffold = match slots[s].is_draw {
-                        true => scaffold::scaffold(ops, &dependents, &asked, s),
-                        false => None,
-                    };
-                    let density = LocalDensity::new(ops, dependents, s, &self.builtins);
-                    Some((s, scaffold, density.map(Box::new)))
+                    let dependents = dependents(ops, slots, s)?;
+                    Some((s, LocalDensity::new(ops, dependents, s, &self.builtins).map(Box::new)))
                 })
                 .collect();
-            for (slot, scaffold, local_density) in found {
-                let facts = &mut self.slots[block.first + slot];
-                (facts.scaffold, facts.local_density) = (scaffold, local_density);
+            for (slot, local_density) in found {
+                self.slots[block.first + slot].local_density = local_density;
             }
         }
     }

@@ -6,15 +6,15 @@
 //! separate blocks. The trace instantiates a block as a frame of nodes, one node per
 //! slot, and evaluates a slot on demand.
 
+mod dependents;
 mod finish;
 mod flatten;
 mod op;
 mod program;
-mod scaffold;
 mod slots;
 mod surrogate;
 
 pub use super::ids::{BlockId, OpId, SiteId, Slot};
 pub use op::{Callee, DistSpec, ElementDraw, ElementKey, Op, Operand, Probe};
 pub use program::{Block, BlockKind, Code, Eager, Force, Observed, Site, SiteSegment, SiteTag};
-pub use slots::{SlotFacts, StaticScaffold};
+pub use slots::SlotFacts;

@@ -191,9 +191,23 @@ impl Lowerer<'_> {
             _ if args.len() > b.args.len() => (args[b.args.len()].value.span, "one too many"),
             _ => (span, "in this call"),
         };
+        let former = unknown.and_then(|n| former(&format!("{} {}", b.name, n.node)));
         let e = self.error(message, at, label);
-        e.hint_also(rest);
+        e.hint_also(former.map_or(rest, str::to_owned));
         e
+    }
+}
+
+/// What became of kernels and of their arguments that no longer exist.
+pub(super) fn former(name: &str) -> Option<&'static str> {
+    match name {
+        "optimize" => Some(
+            "`init(unconstrained())` begins with a climb, `modes(@x)` climbs to modes in warm-up",
+        ),
+        "abc particles" | "abc moves" => Some(
+            "`abc(move, eps)` moves one state towards `eps` from any distance; `smc` draws complete states",
+        ),
+        _ => None,
     }
 }
 

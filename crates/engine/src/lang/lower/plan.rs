@@ -1,6 +1,7 @@
 //! Inference blocks, declared kernels, reports and exports: all checks, and their
 //! compilation to [plans](crate::lang::plan).
 
+use super::hints::former;
 use super::lowerer::{AddHint, Lowerer, PlanScope};
 use super::types::shown;
 use crate::lang::builtins::{self, Builtin, KernelTraits, Kind, PlanForm, Type};
@@ -316,6 +317,7 @@ impl Lowerer<'_> {
             None => format!("unknown kernel `{name}`"),
         };
         let hint = match near {
+            _ if former(name).is_some() => former(name).unwrap_or_default().to_owned(),
             Some(n) => format!("did you mean `{n}`?"),
             None => format!("kernels are {}; see `pcadlang doc`", some.join(", ")),
         };

@@ -6,7 +6,7 @@ use crate::lang::value::{Closure, Value};
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
-use crate::trace::update::{Failure, Poll};
+use crate::trace::update::{Failure, Step};
 use smallvec::SmallVec;
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ impl Graph {
         n: NodeId,
         index: u16,
         default: Option<Operand>,
-    ) -> Result<Poll, Failure> {
+    ) -> Step {
         let frame = self.store[n].frame;
         if let Some((af, o)) = self.argument(n) {
             if let Some(m) = self.unready(af, o) {
@@ -58,7 +58,7 @@ impl Graph {
         cond: Operand,
         then: BlockId,
         otherwise: BlockId,
-    ) -> Result<Poll, Failure> {
+    ) -> Step {
         let frame = self.store[n].frame;
         if let Some(m) = self.unready(frame, cond) {
             return self.need(m);
@@ -97,7 +97,7 @@ impl Graph {
         cond: Operand,
         then: Operand,
         otherwise: Operand,
-    ) -> Result<Poll, Failure> {
+    ) -> Step {
         let frame = self.store[n].frame;
         if let Some(m) = self.unready(frame, cond) {
             return self.need(m);
@@ -130,7 +130,7 @@ impl Graph {
         callee: Callee,
         args: &WrittenArgs,
         site: SiteId,
-    ) -> Result<Poll, Failure> {
+    ) -> Step {
         let frame = self.store[n].frame;
         let closure = match callee {
             Callee::Static(block) => Closure { block, frame: FrameId::ROOT },
@@ -189,7 +189,7 @@ impl Graph {
     }
 
     /// Takes the value of a call or branch from its child frame.
-    fn finish_child(&mut self, n: NodeId) -> Result<Poll, Failure> {
+    fn finish_child(&mut self, n: NodeId) -> Step {
         match self.store[n].side.as_deref() {
             Some(Side::Child(Child { frame, .. })) => self.take_result(n, *frame),
             _ => Ok(self.finish(n, Value::Unit)),
@@ -197,7 +197,7 @@ impl Graph {
     }
 
     /// Takes the value of a node from the result of a frame.
-    pub(super) fn take_result(&mut self, n: NodeId, from: FrameId) -> Result<Poll, Failure> {
+    pub(super) fn take_result(&mut self, n: NodeId, from: FrameId) -> Step {
         match self.code.blocks[self.store[from].block].result {
             Some(result) => self.take_operand(n, from, result),
             None => Ok(self.finish(n, Value::Unit)),
@@ -205,12 +205,7 @@ impl Graph {
     }
 
     /// Takes the value of a node from an operand of a frame, which it holds as its result.
-    pub(super) fn take_operand(
-        &mut self,
-        n: NodeId,
-        from: FrameId,
-        operand: Operand,
-    ) -> Result<Poll, Failure> {
+    pub(super) fn take_operand(&mut self, n: NodeId, from: FrameId, operand: Operand) -> Step {
         if let Some(m) = self.unready(from, operand) {
             return self.need(m);
         }
@@ -254,12 +249,7 @@ impl Graph {
         }
     }
 
-    fn call_builtin(
-        &mut self,
-        n: NodeId,
-        builtin: u32,
-        args: &WrittenArgs,
-    ) -> Result<Poll, Failure> {
+    fn call_builtin(&mut self, n: NodeId, builtin: u32, args: &WrittenArgs) -> Step {
         if !matches!(self.store[n].side.as_deref(), None | Some(Side::Deps(_) | Side::Kept(_))) {
             self.let_side_go(n);
         }
@@ -268,7 +258,7 @@ impl Graph {
             self.code.builtins.get(builtin).match_names(args.iter().map(|(k, _)| k.as_deref()));
         let order = order.map_err(|message| self.type_error(n, message))?;
         let operands: SmallVec<[Operand; 8]> = args.iter().map(|(_, o)| *o).collect();
-        if let Some(step) = self.await_plain(n, frame, &operands)? {
+        if let Some(step) = self.await_plain(frame, &operands)? {
             return Ok(step);
         }
         let mut deps: Deps = operands.iter().filter_map(|o| self.resolve(frame, *o)).collect();
@@ -288,7 +278,7 @@ impl Graph {
         self.finish_call(n, deps, made)
     }
 
-    pub(super) fn evaluate_mem(&mut self, n: NodeId, f: Operand) -> Result<Poll, Failure> {
+    pub(super) fn evaluate_mem(&mut self, n: NodeId, f: Operand) -> Step {
         let frame = self.store[n].frame;
         if let Some(m) = self.unready(frame, f) {
             return self.need(m);
@@ -316,10 +306,10 @@ impl Graph {
     }
 
     /// Evaluates a call through `mem`: finds or creates the entry for its arguments.
-    fn call_memo(&mut self, n: NodeId, memo: NodeId, args: &WrittenArgs) -> Result<Poll, Failure> {
+    fn call_memo(&mut self, n: NodeId, memo: NodeId, args: &WrittenArgs) -> Step {
         let frame = self.store[n].frame;
         let operands: SmallVec<[Operand; 4]> = args.iter().map(|(_, o)| *o).collect();
-        if let Some(step) = self.await_plain(n, frame, &operands)? {
+        if let Some(step) = self.await_plain(frame, &operands)? {
             return Ok(step);
         }
         let mut deps: Deps = operands.iter().filter_map(|o| self.resolve(frame, *o)).collect();
@@ -352,7 +342,7 @@ impl Graph {
         self.finish_memo(n)
     }
 
-    fn finish_memo(&mut self, n: NodeId) -> Result<Poll, Failure> {
+    fn finish_memo(&mut self, n: NodeId) -> Step {
         let side = |n: NodeId| self.store[n].side.as_deref();
         let Some(Side::MemoCall(call)) = side(n) else {
             return Ok(self.finish(n, Value::Unit));

@@ -8,7 +8,7 @@ use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
 use crate::trace::propose::{Change, Constraint};
-use crate::trace::update::{Failure, Poll};
+use crate::trace::update::{Failure, Step};
 use pcadlang_numerics::dist::{Datum, Dist};
 use smallvec::SmallVec;
 
@@ -19,10 +19,10 @@ impl Graph {
         spec: &DistSpec,
         site: SiteId,
         keys: &[Operand],
-    ) -> Result<Poll, Failure> {
+    ) -> Step {
         let frame = self.store[n].frame;
         let mut deps = Deps::new();
-        let dist = match self.dist_now(n, frame, spec, &mut deps) {
+        let dist = match self.dist_now(n, spec, &mut deps) {
             Ok(dist) => dist?,
             Err(m) => return self.need(m),
         };

@@ -6,7 +6,7 @@ use crate::lang::key::Key;
 use crate::lang::value::Value;
 use crate::trace::graph::Graph;
 use crate::trace::node::*;
-use crate::trace::update::{Failure, Poll};
+use crate::trace::update::{Failure, Poll, Step};
 use indexmap::IndexMap;
 use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
@@ -31,7 +31,7 @@ impl Graph {
         code: &Code,
         n: NodeId,
         sources: &[ElementDraw],
-    ) -> Result<Poll, Failure> {
+    ) -> Step {
         let frame = self.store[n].frame;
         let mut deps = Deps::new();
         let entries = if let [ElementDraw { loops, keys, .. }] = sources
@@ -209,7 +209,7 @@ impl Graph {
     }
 
     /// Reads all elements of the container in the preceding slot.
-    pub(super) fn evaluate_gather(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
+    pub(super) fn evaluate_gather(&mut self, code: &Code, n: NodeId) -> Step {
         let container = n.container();
         if self.store[container].state != State::Clean {
             return self.need(container);
@@ -317,7 +317,7 @@ impl Graph {
         n: NodeId,
         base: Operand,
         keys: &[Operand],
-    ) -> Result<Poll, Failure> {
+    ) -> Step {
         let frame = self.store[n].frame;
         if let Some(step) = self.await_all(frame, &[base])? {
             return Ok(step);

@@ -7,14 +7,14 @@ use crate::lang::value::Value;
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
-use crate::trace::update::{Failure, Poll};
+use crate::trace::update::{Failure, Step};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
 impl Graph {
     /// Evaluates the element of a pass.
-    pub(super) fn evaluate_item(&mut self, n: NodeId) -> Result<Poll, Failure> {
+    pub(super) fn evaluate_item(&mut self, n: NodeId) -> Step {
         let frame = &self.store[self.store[n].frame];
         let (owner, pass) = (frame.owner, frame.pass as usize);
         if self.store[owner].state == State::Stale {
@@ -28,7 +28,7 @@ impl Graph {
     }
 
     /// Evaluates the running value of a `fold` before a pass.
-    pub(super) fn evaluate_accumulator(&mut self, n: NodeId) -> Result<Poll, Failure> {
+    pub(super) fn evaluate_accumulator(&mut self, n: NodeId) -> Step {
         let frame = &self.store[self.store[n].frame];
         let (owner, pass) = (frame.owner, frame.pass as usize);
         let home = self.store[owner].frame;
@@ -52,14 +52,9 @@ impl Graph {
         Ok(self.finish(n, value))
     }
 
-    pub(super) fn evaluate_for(
-        &mut self,
-        n: NodeId,
-        iter: Operand,
-        body: BlockId,
-    ) -> Result<Poll, Failure> {
+    pub(super) fn evaluate_for(&mut self, n: NodeId, iter: Operand, body: BlockId) -> Step {
         let frame = self.store[n].frame;
-        if let Some(step) = self.await_plain(n, frame, &[iter])? {
+        if let Some(step) = self.await_plain(frame, &[iter])? {
             return Ok(step);
         }
         let mut deps = Deps::new();
@@ -88,17 +83,12 @@ impl Graph {
         Ok(self.finish_unchanged(n))
     }
 
-    pub(super) fn evaluate_map(
-        &mut self,
-        n: NodeId,
-        f: Operand,
-        over: Operand,
-    ) -> Result<Poll, Failure> {
+    pub(super) fn evaluate_map(&mut self, n: NodeId, f: Operand, over: Operand) -> Step {
         let frame = self.store[n].frame;
         if let Some(step) = self.await_all(frame, &[f])? {
             return Ok(step);
         }
-        if let Some(step) = self.await_plain(n, frame, &[over])? {
+        if let Some(step) = self.await_plain(frame, &[over])? {
             return Ok(step);
         }
         let mut deps = Deps::new();
@@ -149,12 +139,12 @@ impl Graph {
         f: Operand,
         init: Operand,
         over: Operand,
-    ) -> Result<Poll, Failure> {
+    ) -> Step {
         let frame = self.store[n].frame;
         if let Some(step) = self.await_all(frame, &[f])? {
             return Ok(step);
         }
-        if let Some(step) = self.await_plain(n, frame, &[over])? {
+        if let Some(step) = self.await_plain(frame, &[over])? {
             return Ok(step);
         }
         let mut deps = Deps::new();

@@ -10,7 +10,7 @@ pub(crate) use observe::Score;
 
 use super::graph::Graph;
 use super::node::*;
-use super::update::{Failure, Poll};
+use super::update::{Failure, Poll, Step};
 use crate::lang::builtins::{Builtin, PreviousEvaluation};
 use crate::lang::code::{Code, Op, Operand};
 use crate::lang::error::Fault;
@@ -18,7 +18,7 @@ use crate::lang::value::{Closure, Value};
 
 impl Graph {
     /// Makes one attempt to run the operation of a node.
-    pub(super) fn run_op(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
+    pub(super) fn run_op(&mut self, code: &Code, n: NodeId) -> Step {
         let frame = self.store[n].frame;
         match &code.ops[self.store[n].op] {
             Op::Param { index, default } => self.evaluate_param(n, *index, *default),
@@ -38,7 +38,7 @@ impl Graph {
                 self.finish_call(n, deps, made)
             }
             Op::Array(items) => {
-                if let Some(step) = self.await_plain(n, frame, items)? {
+                if let Some(step) = self.await_plain(frame, items)? {
                     return Ok(step);
                 }
                 let mut deps = Deps::new();
@@ -48,7 +48,7 @@ impl Graph {
                 self.finish_made(n, Value::from_elements(values))
             }
             Op::Record { names, values } => {
-                if let Some(step) = self.await_plain(n, frame, values)? {
+                if let Some(step) = self.await_plain(frame, values)? {
                     return Ok(step);
                 }
                 let mut deps = Deps::new();
@@ -101,7 +101,6 @@ impl Graph {
     /// Waits for operands, and for the elements of those that are containers.
     pub(super) fn await_plain(
         &mut self,
-        _n: NodeId,
         frame: FrameId,
         operands: &[Operand],
     ) -> Result<Option<Poll>, Failure> {
@@ -134,7 +133,7 @@ impl Graph {
     }
 
     /// Ends the evaluation of a call.
-    fn finish_call(&mut self, n: NodeId, deps: Deps, made: Made) -> Result<Poll, Failure> {
+    fn finish_call(&mut self, n: NodeId, deps: Deps, made: Made) -> Step {
         match made {
             Made::Value(value) => {
                 self.set_deps(n, deps);

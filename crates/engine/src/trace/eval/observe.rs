@@ -8,23 +8,17 @@ use crate::lang::value::Value;
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
-use crate::trace::update::{Failure, Poll};
+use crate::trace::update::{Failure, Step};
 use pcadlang_numerics::num::ExactSum;
 
 impl Graph {
-    pub(super) fn evaluate_observe(
-        &mut self,
-        n: NodeId,
-        spec: &DistSpec,
-        value: Operand,
-    ) -> Result<Poll, Failure> {
-        let frame = self.store[n].frame;
+    pub(super) fn evaluate_observe(&mut self, n: NodeId, spec: &DistSpec, value: Operand) -> Step {
         let mut deps = Deps::new();
         // Observing a view renders a picture.
         if matches!(spec, DistSpec::Value(_)) {
             self.budget.count_large();
         }
-        let score = match self.observation_score(n, frame, spec, value, &mut deps) {
+        let score = match self.observation_score(n, spec, value, &mut deps) {
             Ok(score) => score?,
             Err(m) => return self.need(m),
         };
@@ -98,7 +92,7 @@ impl Graph {
         score.map(Some).map_err(|f| self.fault(n, f))
     }
 
-    pub(super) fn evaluate_factor(&mut self, n: NodeId, weight: Operand) -> Result<Poll, Failure> {
+    pub(super) fn evaluate_factor(&mut self, n: NodeId, weight: Operand) -> Step {
         let frame = self.store[n].frame;
         if let Some(m) = self.unready(frame, weight) {
             return self.need(m);

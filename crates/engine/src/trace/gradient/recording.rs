@@ -226,12 +226,18 @@ impl Recording {
             return false;
         }
         let drawn = self.tape.draw(rng);
-        let Some(back) = set(trace, self.changed(trace, &drawn), draws) else { return false };
+        let changed = self.changed(trace, &drawn);
+        // Where the trace is, these values may be impossible.
+        let possible = |w: Weight| w.appeared + w.vanished == 0 && w.log_joint.is_finite();
+        if !changed.is_empty() && !trace.propose(&changed, draws).is_ok_and(possible) {
+            trace.rollback();
+            return false;
+        }
         if y.is_some()
             && let Some(in_place) = &mut self.in_place
         {
             if !in_place.fits(&trace.graph, &self.tape, &drawn) {
-                put_back(trace, &back, draws);
+                trace.rollback();
                 return false;
             }
             trace.commit();
@@ -268,42 +274,5 @@ impl Recording {
     /// not known.
     pub fn gradient(&mut self, y: &[f64], power: f64, out: &mut Vec<f64>) -> bool {
         self.tape.gradient(y, power, out)
-    }
-}
-
-/// Gives choices new values: in place where local densities can, which costs less, and by an
-/// update that is pending for the others. Returns the changes that undo what was done in
-/// place. `None`, with the trace unchanged, where the values are impossible.
-fn set(
-    trace: &mut Trace,
-    changes: Vec<(Target, Change)>,
-    draws: Draws,
-) -> Option<Vec<(Target, Change)>> {
-    let (mut back, mut others) = (Vec::new(), Vec::new());
-    for (t, change) in changes {
-        let old = trace.stored(t);
-        let done = match (&change, trace.dist(t)) {
-            (Change::Set(x), Some(dist)) => trace.set_in_place(t, &dist, x),
-            _ => false,
-        };
-        match old.filter(|_| done) {
-            Some(old) => back.push((t, Change::Set(old))),
-            None => others.push((t, change)),
-        }
-    }
-    // Where the trace is, these values may be impossible.
-    let possible = |w: Weight| w.appeared + w.vanished == 0 && w.log_joint.is_finite();
-    if others.is_empty() || trace.propose(&others, draws).is_ok_and(possible) {
-        return Some(back);
-    }
-    put_back(trace, &back, draws);
-    None
-}
-
-/// Undoes the pending update, and these changes.
-fn put_back(trace: &mut Trace, back: &[(Target, Change)], draws: Draws) {
-    trace.rollback();
-    if !back.is_empty() && trace.propose(back, draws).is_ok() {
-        trace.commit();
     }
 }

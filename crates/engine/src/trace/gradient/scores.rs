@@ -77,7 +77,7 @@ impl Reverse<'_> {
                     self.give(frame, *o, by);
                     return Ok(());
                 }
-                let dist = g.make_dist(n, frame, spec, &mut deps)?;
+                let dist = g.make_dist(n, spec, &mut deps)?;
                 let Some((mut by_x, mut params)) = density::gradient(&dist, observed) else {
                     return Err(self.no_density_derivative(n, &dist, observed));
                 };

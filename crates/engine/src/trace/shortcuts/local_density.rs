@@ -32,9 +32,6 @@ pub(crate) type LocalDensities<'c> = SmallVec<[Placed<'c>; 4]>;
 pub(crate) struct Placed<'c> {
     /// The first node of the frame.
     pub base: NodeId,
-    /// The node that has the value: the choice, or an element of a container that is the
-    /// choice.
-    pub entry: NodeId,
     pub local_density: &'c LocalDensity,
 }
 
@@ -50,18 +47,12 @@ pub(crate) struct Evaluation<'a, const N: usize> {
     code: &'a Code,
     base: NodeId,
     registers: [Register<'a>; N],
-    /// A bit for each filled register.
-    filled: u32,
     /// The values that are neither numbers nor part of the trace.
     made: SmallVec<[Value; 4]>,
-    /// Whether an observation's score is a sum over elements.
-    pub summed: bool,
-    /// The selections that take their other alternative.
-    pub turned: SmallVec<[NodeId; 4]>,
-    /// The scores, by node.
-    pub scores: SmallVec<[(NodeId, f64); 8]>,
-    pub prior: ExactSum,
-    pub likelihood: ExactSum,
+    /// Whether a selection takes its other alternative.
+    turned: bool,
+    prior: ExactSum,
+    likelihood: ExactSum,
 }
 
 impl Trace {
@@ -112,12 +103,8 @@ impl Graph {
             return None;
         }
         let mut all = LocalDensities::new();
-        self.add_local_density(
-            target,
-            target - facts.slot,
-            facts.local_density.as_deref()?,
-            &mut all,
-        )?;
+        let own = facts.local_density.as_deref()?;
+        self.add_local_density(target - facts.slot, own, &mut all)?;
         let readers = &self.outside(target).users;
         if readers.len() > READERS {
             return None;
@@ -137,7 +124,7 @@ impl Graph {
             if self.is_read_outside(*m) {
                 return None;
             }
-            self.add_local_density(*m, *m - facts.slot, facts.local_density.as_deref()?, &mut all)?;
+            self.add_local_density(*m - facts.slot, facts.local_density.as_deref()?, &mut all)?;
         }
         Some(all)
     }
@@ -145,7 +132,6 @@ impl Graph {
     /// Adds a local density, if it covers everything that depends on its value.
     fn add_local_density<'c>(
         &self,
-        entry: NodeId,
         base: NodeId,
         local_density: &'c LocalDensity,
         all: &mut LocalDensities<'c>,
@@ -159,7 +145,7 @@ impl Graph {
         {
             return None;
         }
-        all.push(Placed { base, entry, local_density });
+        all.push(Placed { base, local_density });
         Some(())
     }
 
@@ -219,21 +205,19 @@ impl<'a> Evaluation<'a, REGISTERS> {
     }
 
     /// Starts with a value of the choice.
-    pub fn begin(&mut self, value: Register<'a>) {
+    fn begin(&mut self, value: Register<'a>) {
         self.registers[0] = value;
         self.made.clear();
-        self.summed = false;
-        self.turned.clear();
-        self.scores.clear();
+        self.turned = false;
         self.prior = ExactSum::default();
         self.likelihood = ExactSum::default();
     }
 
     /// Runs a local density. With `may_choose`, selections may take their other
     /// alternative.
-    pub fn run(&mut self, placed: &Placed, may_choose: bool) -> Option<()> {
+    fn run(&mut self, placed: &Placed, may_choose: bool) -> Option<()> {
         let local_density = placed.local_density;
-        (self.base, self.filled) = (placed.base, 1);
+        self.base = placed.base;
         let mut next = 0;
         while let Some(instruction) = local_density.instructions.get(next) {
             next += 1;
@@ -283,12 +267,11 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     let node = self.node(slot);
                     let other =
                         node.state == State::Clean && holds != (node.flags & OTHERWISE == 0);
-                    if other && !self.turned.contains(&(self.base + slot)) {
-                        if self.turned.is_empty() && !(may_choose && self.can_choose(local_density))
-                        {
+                    if other && !self.turned {
+                        if !(may_choose && self.can_choose(local_density)) {
                             return None;
                         }
-                        self.turned.push(self.base + slot);
+                        self.turned = true;
                     }
                     if !holds {
                         next = otherwise as usize;
@@ -307,7 +290,6 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     )?;
                     self.prior.sub(self.node(slot).score);
                     self.prior.add(score);
-                    self.scores.push((self.base + slot, score));
                 }
                 Instruction::Observe { slot, builtin, ref parameters, value } => {
                     let n = self.base + slot;
@@ -317,7 +299,6 @@ impl<'a> Evaluation<'a, REGISTERS> {
                         Some(score) => {
                             self.graph.take_score(n, &mut self.likelihood);
                             self.likelihood.add(score);
-                            self.scores.push((n, score));
                         }
                         None => {
                             let count = self.code.builtins.get(builtin).args.len();
@@ -332,27 +313,15 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     let weight = self.number(weight).filter(|w| !w.is_nan())?;
                     self.likelihood.sub(self.node(slot).score);
                     self.likelihood.add(weight);
-                    self.scores.push((self.base + slot, weight));
                 }
             }
         }
         Some(())
     }
 
-    /// Whether a register has been filled.
-    pub fn is_filled(&self, r: u8) -> bool {
-        self.filled & (1 << r) != 0
-    }
-
-    /// Returns the value in a register.
-    pub fn value_in(&self, r: u8) -> Value {
-        self.to_value(self.registers[r as usize])
-    }
-
     #[inline(always)]
     fn fill(&mut self, into: u8, value: Register<'a>) {
         self.registers[into as usize] = value;
-        self.filled |= 1 << into;
     }
 
     /// Runs the operation in a slot on these operands, as an update would.
@@ -412,14 +381,8 @@ impl<'a> Evaluation<'a, REGISTERS> {
         let score = self.graph.score_of_values(n, dist, &values, &observed).ok()?;
         self.graph.take_score(n, &mut self.likelihood);
         match score {
-            Score::One(score) => {
-                self.likelihood.add(score);
-                self.scores.push((n, score));
-            }
-            Score::Sum(sum) => {
-                self.likelihood.merge(&sum);
-                self.summed = true;
-            }
+            Score::One(score) => self.likelihood.add(score),
+            Score::Sum(sum) => self.likelihood.merge(&sum),
         }
         Some(())
     }
@@ -501,11 +464,8 @@ impl<'a, const N: usize> Evaluation<'a, N> {
             code,
             base: NodeId::default(),
             registers,
-            filled: 0,
             made: SmallVec::new(),
-            summed: false,
-            turned: SmallVec::new(),
-            scores: SmallVec::new(),
+            turned: false,
             prior: ExactSum::default(),
             likelihood: ExactSum::default(),
         }

@@ -49,12 +49,6 @@ impl Update {
         }
     }
 
-    /// Invalidates the nodes of other frames that read a choice.
-    pub fn invalidate_outside_users(&mut self, store: &mut Store, code: &Code, n: NodeId) {
-        self.invalidate_each_outside(store, code, n);
-        self.invalidate_pending(store, code);
-    }
-
     fn invalidate_each_outside(&mut self, store: &mut Store, code: &Code, n: NodeId) {
         for i in 0..store.outside(n).users.len() {
             let user = store.outside(n).users[i];

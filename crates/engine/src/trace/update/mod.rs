@@ -5,7 +5,7 @@
 mod invalidate;
 mod propagate;
 
-pub(super) use propagate::{Failure, Poll};
+pub(super) use propagate::{Failure, Poll, Step};
 
 use super::journal::Entry;
 use super::node::*;

@@ -24,6 +24,9 @@ pub(crate) enum Poll {
     Pending,
 }
 
+/// One attempt to evaluate a node.
+pub(crate) type Step = Result<Poll, Failure>;
+
 /// A failure with its location.
 pub(crate) type Failure = Box<RunError>;
 
@@ -183,7 +186,7 @@ impl Graph {
     }
 
     /// Pushes a node that is needed onto the stack.
-    pub fn need(&mut self, n: NodeId) -> Result<Poll, Failure> {
+    pub fn need(&mut self, n: NodeId) -> Step {
         if self.store[n].state == State::Running {
             let message = match self.name_of(n) {
                 Some(name) => format!("`{name}` depends on its own value"),
@@ -208,7 +211,7 @@ impl Graph {
 
     /// Ends the evaluation of a node with a newly built value, which counts towards the
     /// limits.
-    pub fn finish_made(&mut self, n: NodeId, value: Value) -> Result<Poll, Failure> {
+    pub fn finish_made(&mut self, n: NodeId, value: Value) -> Step {
         self.budget.count_elements(&self.store, n, &value)?;
         Ok(self.finish(n, value))
     }
@@ -271,7 +274,7 @@ impl Graph {
     }
 
     /// Makes one attempt to evaluate a node.
-    fn step(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
+    fn step(&mut self, code: &Code, n: NodeId) -> Step {
         if self.store[n].flags & WAS_STALE != 0 && self.incremental {
             let mut changed = false;
             let mut wait = NodeId::NONE;
@@ -303,7 +306,7 @@ impl Graph {
     }
 
     /// Makes one attempt to run the operation of a node.
-    pub fn run(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
+    pub fn run(&mut self, code: &Code, n: NodeId) -> Step {
         let step = self.run_op(code, n).map_err(|mut e| {
             // A choice outside of its support, such as a label beyond the number of groups,
             // gives the state density zero, whatever it indexes. A choice is scored before

@@ -8,6 +8,7 @@
 //! choices appear or vanish, or the density is 0 has infinite energy.
 
 mod adapt;
+mod ascent;
 pub(super) mod hmc;
 mod kernel;
 mod laplace;
@@ -15,13 +16,11 @@ pub(super) mod mala;
 mod memory;
 pub(super) mod modes;
 pub(super) mod nuts;
-pub(super) mod optimize;
 mod point;
 mod summed;
 mod system;
 
+pub(crate) use ascent::approach;
 pub use hmc::Hmc;
 pub use kernel::Hamiltonian;
 pub use nuts::Nuts;
-pub use optimize::Optimize;
-pub(crate) use optimize::approach;

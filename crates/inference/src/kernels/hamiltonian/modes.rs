@@ -7,9 +7,9 @@
 //! modes, drawn by their evidence: the chain then begins where the mass is, and not in
 //! the mode it happened to climb to.
 
+use super::ascent::{Past, ascend};
 use super::laplace::Laplace;
 use super::memory::Memory;
-use super::optimize::{Past, ascend};
 use super::system::System;
 use crate::kernel::{
     Kernel, Outcome, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,

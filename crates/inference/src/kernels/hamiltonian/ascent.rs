@@ -1,39 +1,17 @@
-//! `optimize(sel)`: climbs to a mode by L-BFGS (Nocedal & Wright 2006, algorithm 7.4)
-//! with a backtracking line search.
-//!
-//! This is not a sampler, but provides an initial state or a quick estimate. The mode is
-//! that of the density in the unconstrained space, in which the other kernels of this
-//! family move.
+//! Ascent to a mode by L-BFGS (Nocedal & Wright 2006, algorithm 7.4) with a backtracking
+//! line search. The mode is that of the density in the unconstrained space, in which the
+//! kernels of this family move.
 
 use super::memory::Memory;
 use super::point::Point;
 use super::system::System;
-use crate::kernel::{Kernel, Outcome, Registered, SiteSelection, StepContext};
-use crate::kernels::row::{KernelRow, SEL, Type, number, opt};
-use crate::state::{StateError, pack, unpack};
+use crate::kernel::StepContext;
 use pcadlang_engine::trace::{ChoiceKind, Selector, Trace, TraceResult};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-pub(crate) const ROW: KernelRow = KernelRow::new(
-    "optimize",
-    &[SEL, opt("steps", Type::Int, "100", "The number of gradient steps.")],
-    "Climbs to a mode of the posterior: for starting points or quick answers. Not a sampler.",
-    number!("infer { repeat 10 { optimize(@x, steps = 20); collect x; } }"),
-    |call| call.moving(|scope, call| Ok(Optimize::new(scope, call.whole(1, 100, 1, 1_000_000)?))),
-)
-.irreversible();
-
 /// The number of previous steps from which the curvature is estimated.
 const MEMORY: usize = 8;
-
-/// Gradient ascent with estimated curvature.
-#[derive(Clone, Debug)]
-pub struct Optimize {
-    scope: Registered,
-    steps: u32,
-    memory: Memory,
-}
 
 /// A step and the change of the gradient over it.
 #[derive(Clone, Debug)]
@@ -44,13 +22,6 @@ pub(super) struct Pair {
 
 /// The last steps of a climb, which remain valid if it is interrupted.
 pub(super) type Past = VecDeque<Pair>;
-
-impl Optimize {
-    /// A kernel for these choices, with at most `steps` steps.
-    pub fn new(scope: SiteSelection, steps: u32) -> Self {
-        Optimize { scope: Registered::new(scope), steps, memory: Memory::default() }
-    }
-}
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
@@ -167,41 +138,10 @@ pub(crate) fn approach(trace: &mut Trace, at: &StepContext) -> TraceResult<()> {
     Ok(())
 }
 
-impl Kernel for Optimize {
-    fn name(&self) -> String {
-        "optimize".into()
-    }
-
-    fn save(&self, trace: &Trace) -> Vec<u8> {
-        pack(&self.memory.habits(trace))
-    }
-
-    fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
-        self.memory = Memory::with(unpack(state)?);
-        Ok(())
-    }
-
-    fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
-        let mut rng = at.stream();
-        let (targets, _) = self.scope.members(trace, &mut rng);
-        let Some((mut system, begun)) = System::begin(trace, at, &targets, None, &mut self.memory)?
-        else {
-            return Ok(Outcome::default());
-        };
-        let here = ascend(&mut system, &begun, self.steps, &mut Past::new())?;
-        let moved = here.log_density > begun.log_density && system.finish_at(Some(&here))?;
-        if !moved {
-            trace.rollback();
-        }
-        Ok(Outcome::one(moved))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Pick;
-    use pcadlang_engine::trace::{Draws, Selector};
+    use pcadlang_engine::trace::Draws;
 
     /// -2 |y|^2 has the gradient -4 y: one step along an axis determines the curvature in
     /// all directions.
@@ -209,6 +149,16 @@ mod tests {
     fn the_direction_leads_to_the_top_of_a_round_hill() {
         let past = VecDeque::from([Pair { step: vec![1.0, 0.0], change: vec![4.0, 0.0] }]);
         assert_eq!(direction(&[8.0, 4.0], &past), [2.0, 1.0]);
+    }
+
+    /// Makes at most so many steps with all choices from a state.
+    fn climb_all(trace: &mut Trace, steps: u32) {
+        let (at, mut memory) = (StepContext::new(1, 0, 0), Memory::default());
+        let targets = trace.all_targets().to_vec();
+        let (mut system, begun) =
+            System::begin(trace, &at, &targets, None, &mut memory).unwrap().unwrap();
+        let top = ascend(&mut system, &begun, steps, &mut Past::new()).unwrap();
+        assert!(system.finish_at(Some(&top)).unwrap());
     }
 
     /// The gradient points across a ridge, while the last steps point along it.
@@ -220,8 +170,7 @@ mod tests {
         for (address, x) in [("@a", 2.0), ("@b", -1.0)] {
             trace.set(address, x, Draws::default()).unwrap();
         }
-        let scope = SiteSelection { selector: Selector::All, pick: Pick::All };
-        Optimize::new(scope, 40).step(&mut trace, &StepContext::new(1, 0, 0)).unwrap();
+        climb_all(&mut trace, 40);
         for t in trace.all_targets() {
             let x = trace.stored(*t).and_then(|x| x.num()).unwrap();
             // Where a = b and a + 100 (a + b - 1) = 0.
@@ -237,8 +186,7 @@ mod tests {
         let text = "assume x ~ flat(); factor(x - 2 * log1p(exp(x - 50)));";
         let mut trace = crate::testing::trace(text, 1);
         trace.set("@x", 15.0, Draws::default()).unwrap();
-        let scope = SiteSelection { selector: Selector::All, pick: Pick::All };
-        Optimize::new(scope, 60).step(&mut trace, &StepContext::new(1, 0, 0)).unwrap();
+        climb_all(&mut trace, 60);
         let x = trace.stored(trace.all_targets()[0]).and_then(|x| x.num()).unwrap();
         assert!((x - 50.0).abs() < 1e-3, "{x}");
     }
