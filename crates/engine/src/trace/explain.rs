@@ -143,36 +143,18 @@ impl Store {
     /// True if a node that decides whether `n` exists is stale: the condition of a branch
     /// around it, or what a loop runs over.
     fn hangs_on_marked(&self, n: NodeId) -> bool {
-        let mut deciding = Vec::new();
-        self.deciding(n, &mut deciding);
-        deciding.iter().any(|d| self[*d].state == State::Stale)
-    }
-
-    /// Collects the nodes that decide whether `n` exists.
-    fn deciding(&self, n: NodeId, into: &mut Vec<NodeId>) {
-        let mut frame = self[n].frame;
-        loop {
-            let owner = self[frame].owner;
-            if owner == NodeId::NONE {
-                return;
-            }
-            frame = self[owner].frame;
-            let mut by = |o: Operand| into.extend(self.resolve(frame, o));
-            match self.op(owner) {
-                Op::If { cond, .. } => by(*cond),
-                Op::For { iter, .. } => by(*iter),
-                Op::Map { over, .. } | Op::Fold { over, .. } => by(*over),
-                Op::Call { callee: Callee::Value(f), .. } => by(*f),
-                _ => {}
-            }
+        let mut found = false;
+        for owner in self.owners(n) {
+            self.deciders(owner, |d| found |= self[d].state == State::Stale);
         }
+        found
     }
 
     fn origins(&self, n: NodeId) -> Vec<Address> {
         let mut seen = vec![false; self.len()];
         let mut open = Vec::new();
         self.each_dep(n, |d, _| open.push(d));
-        self.deciding(n, &mut open);
+        self.owners(n).for_each(|owner| self.deciders(owner, |d| open.push(d)));
         let mut found = Vec::new();
         while let Some(d) = open.pop() {
             if std::mem::replace(&mut seen[d], true) {

@@ -259,7 +259,7 @@ impl Trace {
             };
             let frame = self.graph.store[n].frame;
             let Value::Likelihood(l) = self.graph.value(frame, *o) else { return None };
-            let observed = self.graph.observed_value(n, *value, &mut node::Deps::new());
+            let observed = self.graph.observed_value(n);
             Some((n, &**l, observed))
         })
     }

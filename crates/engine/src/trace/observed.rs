@@ -45,9 +45,7 @@ impl Trace {
     pub fn observed(&self) -> Vec<Observation> {
         let g = &self.graph;
         let one = |n: NodeId| {
-            let Op::Observe { value, site, .. } = g.op(n) else { return None };
-            let hash = g.site_hash(g.store[n].frame, *site);
-            let value = g.observed_value(n, *value, &mut Deps::new()).clone();
+            let (hash, value) = (g.observation_hash(n)?, g.observed_value(n).clone());
             Some(Observation { address: g.address(n), hash, value })
         };
         let mut all: Vec<_> = self.scored_nodes().filter_map(one).collect();
@@ -66,11 +64,10 @@ impl Trace {
         let mut silent = Vec::new();
         for n in self.scored_nodes() {
             let address = g.address(n);
-            let Op::Observe { site, .. } = g.op(n) else {
+            let Some(hash) = g.observation_hash(n) else {
                 silent.push((address, "a factor".to_owned()));
                 continue;
             };
-            let hash = g.site_hash(g.store[n].frame, *site);
             match g.draw_observed(n, &mut draws.stream(hash))? {
                 Ok(value) => all.push((address, hash, value)),
                 Err(what) => silent.push((address, what)),
@@ -102,14 +99,14 @@ impl Trace {
         let g = &self.graph;
         let (mut all, mut count) = (Vec::new(), 0);
         for n in self.scored_nodes() {
-            let Op::Observe { dist: spec, value, site, .. } = g.op(n) else { continue };
-            let (mut deps, frame) = (Deps::new(), g.store[n].frame);
-            let observed = g.observed_value(n, *value, &mut deps);
+            let Op::Observe { dist: spec, site, .. } = g.op(n) else { continue };
+            let frame = g.store[n].frame;
+            let observed = g.observed_value(n);
             let likelihood =
                 matches!(spec, DistSpec::Value(o) if !matches!(g.value(frame, *o), Value::Dist(_)));
             let scores = match likelihood {
                 true => vec![self.score_at(n)],
-                false => match g.make_dist(n, spec, &mut deps) {
+                false => match g.make_dist(n, spec) {
                     Ok(dist) => pointwise(&dist, observed),
                     Err(_) => vec![f64::NAN],
                 },
@@ -155,11 +152,7 @@ impl Trace {
 
     /// Returns the observations by the hashes of their addresses.
     pub(super) fn observation_nodes(&self) -> FxHashMap<u64, NodeId> {
-        let g = &self.graph;
-        let hashed = |n: NodeId| match g.op(n) {
-            Op::Observe { site, .. } => Some((g.site_hash(g.store[n].frame, *site), n)),
-            _ => None,
-        };
+        let hashed = |n| Some((self.graph.observation_hash(n)?, n));
         self.scored_nodes().filter_map(hashed).collect()
     }
 

@@ -259,7 +259,7 @@ impl Trace {
     fn observed_at(&self, address: &Address, nodes: &FxHashMap<u64, NodeId>) -> Option<Value> {
         let n = *nodes.get(&address.hash64())?;
         let Op::Observe { value, .. } = self.graph.op(n) else { return None };
-        Some(self.graph.observed_value(n, *value, &mut super::node::Deps::new()).clone())
+        Some(self.graph.observed_value(n).clone())
     }
 
     fn unknown(&self, address: &Address) -> Box<RunError> {

@@ -351,6 +351,42 @@ impl Store {
         }
     }
 
+    /// Calls `f` with the nodes whose values decide which other nodes a node reads, and
+    /// which frames it has.
+    pub fn deciders(&self, n: NodeId, mut f: impl FnMut(NodeId)) {
+        let node = &self[n];
+        let mut operand = |o: &Operand| {
+            if let Some(d) = self.resolve(node.frame, *o) {
+                f(d);
+            }
+        };
+        match self.op(n) {
+            Op::If { cond, .. } | Op::Select { cond, .. } => operand(cond),
+            Op::For { iter, .. } => operand(iter),
+            Op::Map { f, over, .. } | Op::Fold { f, over, .. } => {
+                [f, over].into_iter().for_each(operand)
+            }
+            Op::Mem { f, .. } => operand(f),
+            Op::Draw { keys, .. } => keys.iter().for_each(operand),
+            // The elements of arrays are not nodes; those of containers are.
+            Op::Index { keys, .. } if node.side.is_some() => keys.iter().for_each(operand),
+            Op::Call { callee: Callee::Value(v), .. } => operand(v),
+            _ => {}
+        }
+        if let Some(side @ (Side::MemoCall(_) | Side::Table(_) | Side::Loop(_))) =
+            node.side.as_deref()
+        {
+            side.deps().iter().for_each(|d| f(*d));
+        }
+    }
+
+    /// Iterates over the nodes around a node, from the inside out: those that made the frames
+    /// that it is in.
+    pub fn owners(&self, n: NodeId) -> impl Iterator<Item = NodeId> {
+        let owner = |n: NodeId| Some(self[self[n].frame].owner).filter(|o| *o != NodeId::NONE);
+        std::iter::successors(owner(n), move |n| owner(*n))
+    }
+
     /// True if a parameter's value comes with its frame rather than from an argument.
     fn has_own_value(&self, n: NodeId) -> bool {
         let frame = &self[self[n].frame];

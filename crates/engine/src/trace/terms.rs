@@ -49,7 +49,7 @@ impl Store {
         if let Some(simple) = self.simple_dist(n) {
             return Some(simple);
         }
-        self.make_dist(n, dist, &mut Deps::new()).ok()
+        self.make_dist(n, dist).ok()
     }
 
     fn tags(&self, n: NodeId) -> Vec<(Arc<str>, Option<Key>)> {
@@ -106,16 +106,9 @@ impl Store {
     }
 
     /// Returns the distribution of a draw or observation whose parameters are evaluated.
-    pub(crate) fn make_dist(
-        &self,
-        n: NodeId,
-        spec: &DistSpec,
-        deps: &mut Deps,
-    ) -> Result<Dist, Failure> {
-        match self.dist_now(n, spec, deps) {
-            Ok(dist) => dist,
-            Err(_) => Err(self.type_error(n, "its parameters are not evaluated".into())),
-        }
+    pub(crate) fn make_dist(&self, n: NodeId, spec: &DistSpec) -> Result<Dist, Failure> {
+        self.dist_now(n, spec, &mut Deps::new())
+            .unwrap_or_else(|_| Err(self.type_error(n, "its parameters are not evaluated".into())))
     }
 
     /// Returns the distribution of a draw or observation, or else the node to wait for.
@@ -275,40 +268,43 @@ impl Store {
         };
     }
 
+    /// Returns the hash of the address of an observation.
+    pub fn observation_hash(&self, n: NodeId) -> Option<u64> {
+        let Op::Observe { site, .. } = self.op(n) else { return None };
+        Some(self.site_hash(self[n].frame, *site))
+    }
+
     /// Returns the value that replaces an observation's value in the program, if any.
     pub(crate) fn replaced(&self, n: NodeId) -> Option<&Value> {
         if self.observed.is_empty() {
             return None;
         }
-        let Op::Observe { site, .. } = self.op(n) else { return None };
-        self.observed.get(&self.site_hash(self[n].frame, *site))
+        self.observed.get(&self.observation_hash(n)?)
     }
 
-    /// Returns the value of an observation; nodes read for it are added to `deps`.
-    pub(crate) fn observed_value<'a>(
-        &'a self,
-        n: NodeId,
-        value: Operand,
-        deps: &mut Deps,
-    ) -> &'a Value {
-        match self.replaced(n) {
-            Some(v) => v,
-            None => self.plain(self[n].frame, value, deps),
+    /// Returns the value of an observation.
+    pub(crate) fn observed_value(&self, n: NodeId) -> &Value {
+        match (self.replaced(n), self.op(n)) {
+            (Some(v), _) => v,
+            (None, Op::Observe { value, .. }) => {
+                self.plain(self[n].frame, *value, &mut Deps::new())
+            }
+            _ => &Value::Unit,
         }
     }
 
     /// Returns a message if the observed value is outside the support of its distribution
     /// under the current parameters, so that its probability is zero.
     pub(super) fn outside_support(&self, n: NodeId) -> Option<String> {
-        let Op::Observe { dist: spec, value, .. } = self.op(n) else { return None };
-        let (mut deps, frame) = (Deps::new(), self[n].frame);
-        let observed = self.observed_value(n, *value, &mut deps);
+        let Op::Observe { dist: spec, .. } = self.op(n) else { return None };
+        let frame = self[n].frame;
+        let observed = self.observed_value(n);
         if let DistSpec::Value(o) = spec
             && !matches!(self.value(frame, *o), Value::Dist(_))
         {
             return None;
         }
-        let dist = self.make_dist(n, spec, &mut deps).ok()?;
+        let dist = self.make_dist(n, spec).ok()?;
         let count =
             dist.elements().or_else(|| observed.len().filter(|_| is_repeated(&dist, observed)));
         let Some(count) = count else { return outside(&dist, observed) };
@@ -322,11 +318,10 @@ impl Store {
         rng: &mut Stream,
     ) -> Result<Result<Value, String>, Failure> {
         let frame = self[n].frame;
-        let Op::Observe { dist: spec, value, .. } = self.op(n) else {
+        let Op::Observe { dist: spec, .. } = self.op(n) else {
             return Ok(Err("a factor".into()));
         };
-        let mut deps = Deps::new();
-        let observed = self.observed_value(n, *value, &mut deps);
+        let observed = self.observed_value(n);
         if let DistSpec::Value(o) = spec
             && let Value::Likelihood(l) = self.value(frame, *o)
         {
@@ -335,7 +330,7 @@ impl Store {
                 None => Ok(Err(format!("the likelihood `{}`", l.name()))),
             };
         }
-        let dist = self.make_dist(n, spec, &mut deps)?;
+        let dist = self.make_dist(n, spec)?;
         if dist.is_improper() {
             return Ok(Err(format!("the improper distribution `{}`", dist.name())));
         }

@@ -514,7 +514,7 @@ impl Recorder<'_> {
         let mark = self.recorded.tape.mark();
         match spec {
             DistSpec::Family { builtin, args } => {
-                let dist = graph.make_dist(n, spec, &mut Deps::new()).ok()?;
+                let dist = graph.make_dist(n, spec).ok()?;
                 let args = self.operands(frame, args);
                 self.recorded.tape.family(
                     graph.code.builtins.get(*builtin),

@@ -64,7 +64,7 @@ impl Reverse<'_> {
             }
             Op::Observe { dist: spec, value, .. } => {
                 let mut deps = Deps::new();
-                let observed = g.observed_value(n, *value, &mut deps);
+                let observed = g.observed_value(n);
                 if let DistSpec::Value(o) = spec
                     && let Value::Likelihood(l) = g.value(frame, *o)
                 {
@@ -77,7 +77,7 @@ impl Reverse<'_> {
                     self.give(frame, *o, by);
                     return Ok(());
                 }
-                let dist = g.make_dist(n, spec, &mut deps)?;
+                let dist = g.make_dist(n, spec)?;
                 let Some((mut by_x, mut params)) = density::gradient(&dist, observed) else {
                     return Err(self.no_density_derivative(n, &dist, observed));
                 };

@@ -128,13 +128,8 @@ impl Trace {
         if elimination.owners.is_empty() || matches!(self.graph.op(score), Op::Draw { .. }) {
             return None;
         }
-        let mut n = score;
-        let mut found = None;
-        while n != NodeId::NONE {
-            found = elimination.owners.get(&n).copied().or(found);
-            n = self.graph.store[self.graph.store[n].frame].owner;
-        }
-        found
+        let around = std::iter::once(score).chain(self.graph.owners(score));
+        around.filter_map(|n| elimination.owners.get(&n).copied()).last()
     }
 
     /// Whether the choices have the same supports in the current state (including a

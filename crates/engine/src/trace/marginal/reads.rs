@@ -358,35 +358,3 @@ impl<'a> Reader<'a> {
         (label, outermost)
     }
 }
-
-impl Store {
-    /// Calls `f` with the nodes whose values decide which other nodes a node reads, and
-    /// which frames it has.
-    pub(in crate::trace) fn deciders(&self, n: NodeId, mut f: impl FnMut(NodeId)) {
-        let node = &self[n];
-        let mut operand = |o: &Operand| {
-            if let Some(d) = self.resolve(node.frame, *o) {
-                f(d);
-            }
-        };
-        match self.op(n) {
-            Op::If { cond, .. } | Op::Select { cond, .. } => operand(cond),
-            Op::For { iter, .. } => operand(iter),
-            Op::Map { f, over, .. } | Op::Fold { f, over, .. } => {
-                [f, over].into_iter().for_each(operand)
-            }
-            Op::Mem { f, .. } => operand(f),
-            Op::Draw { keys, .. } => keys.iter().for_each(operand),
-            // The elements of arrays are not nodes; those of containers are.
-            Op::Index { keys, .. } if node.side.is_some() => keys.iter().for_each(operand),
-            Op::Call { callee: Callee::Value(v), .. } => operand(v),
-            _ => {}
-        }
-        match node.side.as_deref() {
-            Some(Side::MemoCall(c)) => c.deps.iter().for_each(|d| f(*d)),
-            Some(Side::Table(t)) => t.deps.iter().for_each(|d| f(*d)),
-            Some(Side::Loop(l)) => l.deps.iter().for_each(|d| f(*d)),
-            _ => {}
-        }
-    }
-}

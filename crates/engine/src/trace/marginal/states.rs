@@ -187,12 +187,10 @@ impl Trace {
             if matches!(self.graph.op(n), Op::Draw { .. }) {
                 return scopes.contains_key(&n).then_some(n);
             }
-            let (mut at, mut outermost) = (n, None);
-            while at != NodeId::NONE {
-                outermost = Some(at).filter(|at| scopes.contains_key(at)).or(outermost);
-                at = self.graph.store[self.graph.store[at].frame].owner;
-            }
-            outermost
+            std::iter::once(n)
+                .chain(self.graph.owners(n))
+                .filter(|at| scopes.contains_key(at))
+                .last()
         };
         all.into_iter().map(|n| (factor(n), n)).collect()
     }

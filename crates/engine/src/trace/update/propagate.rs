@@ -127,13 +127,7 @@ impl Graph {
     /// Runs an effect or choice, unless an owner of an enclosing frame detaches that
     /// frame: outer owners decide whether inner ones still exist.
     fn run_in_place(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
-        let mut owners: SmallVec<[NodeId; 8]> = SmallVec::new();
-        let mut f = self.store[n].frame;
-        while self.store[f].owner != NodeId::NONE {
-            let owner = self.store[f].owner;
-            owners.push(owner);
-            f = self.store[owner].frame;
-        }
+        let mut owners: SmallVec<[NodeId; 8]> = self.owners(n).collect();
         while let Some(owner) = owners.pop() {
             if self.store[owner].state == State::Stale {
                 self.evaluate(code, owner)?;
