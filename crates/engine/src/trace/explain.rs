@@ -7,7 +7,7 @@
 use super::node::*;
 use super::store::Store;
 use super::{Address, Target, Trace};
-use crate::lang::code::{Callee, Op, Operand};
+use crate::lang::code::Op;
 use pcadlang_numerics::num::ExactSum;
 use pcadlang_syntax::span::Span;
 use rustc_hash::FxHashSet;

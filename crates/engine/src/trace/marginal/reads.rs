@@ -7,7 +7,7 @@
 //! values: a value that is equal for two values of a choice may differ for a third.
 
 use super::partition::Partition;
-use crate::lang::code::{Callee, Op, Operand};
+use crate::lang::code::Op;
 use crate::trace::gradient::Given;
 use crate::trace::node::*;
 use crate::trace::store::Store;
