@@ -2,16 +2,19 @@
 //! and programs that cannot be simulated are refused with the reason.
 
 use pcadlang::Model;
+use pcadlang_engine::lang::code::Code;
 use pcadlang_engine::lang::value::Value;
-use pcadlang_engine::trace::{Change, Selector, Trace, TraceResult};
+use pcadlang_engine::trace::{Change, Draws, Limits, Selector, Trace, TraceResult};
 use pcadlang_inference::calibration::{
-    CalibrationError, KernelSampler, PlanSampler, Settings, geweke, sbc,
+    CalibrationError, PlanSampler, Sampler, Settings, geweke, sbc,
 };
 use pcadlang_inference::{
-    Kernel, Mh, Outcome, Pick, Progress, RunOptions, SiteSelection, StepContext,
+    Callback, ChainError, Kernel, Mh, Outcome, Pick, Progress, RunOptions, SiteSelection, Start,
+    StepContext, starts,
 };
 use pcadlang_numerics::dist::Datum;
-use pcadlang_numerics::rng::Stream;
+use pcadlang_numerics::rng::{Purpose, Stream, StreamKey};
+use std::sync::Arc;
 
 const GAMMA: &str = "assume s ~ gamma(3, 3); observe poisson(4 * s) = [2, 3] as n;";
 
@@ -71,7 +74,51 @@ impl Kernel for Eager {
     }
 }
 
-fn looped(kernel: fn() -> Box<dyn Kernel>, every: u64) -> KernelSampler<fn() -> Box<dyn Kernel>> {
+/// A sampler that applies one kernel in a loop from a draw from the prior, for custom
+/// kernels.
+struct KernelSampler {
+    /// Constructs the kernel of a chain.
+    kernel: fn() -> Box<dyn Kernel>,
+    /// The seed.
+    seed: u64,
+    /// Applications before the first draw, in which the kernel may adapt.
+    warmup: u64,
+    /// Applications between draws; at least 1.
+    every: u64,
+    /// The number of draws, if the check does not set the number of steps.
+    draws: u64,
+}
+
+impl Sampler for KernelSampler {
+    fn run(
+        &self,
+        code: &Arc<Code>,
+        chain: u32,
+        steps: Option<u64>,
+        callback: Arc<dyn Callback>,
+    ) -> Result<u64, ChainError> {
+        let begun = starts(code, self.seed, chain, Start::default(), Limits::default())
+            .map_err(ChainError::Start)?;
+        let Some(mut trace) = begun.into_iter().next() else { return Ok(0) };
+        let mut kernel = (self.kernel)();
+        let every = self.every.max(1);
+        let steps = steps.unwrap_or(self.draws * every);
+        let predict = StreamKey::new(self.seed, chain, Purpose::PREDICT);
+        for step in 0..self.warmup + steps {
+            let adapting = step < self.warmup;
+            kernel.step(
+                &mut trace,
+                &StepContext { adapting, ..StepContext::new(self.seed, chain, step) },
+            )?;
+            if !adapting && (step - self.warmup + 1).is_multiple_of(every) {
+                callback.draw(chain, &mut trace, Draws { key: predict, step, substream: 0 });
+            }
+        }
+        Ok(steps)
+    }
+}
+
+fn looped(kernel: fn() -> Box<dyn Kernel>, every: u64) -> KernelSampler {
     KernelSampler { kernel, seed: 5, warmup: 50, every, draws: 40 }
 }
 

@@ -147,7 +147,7 @@ pub(crate) fn starts_from(
     let mut begun = Instant::now();
     let key = StreamKey::new(seed, chain, Purpose::START);
     let (limits, by) = (&limits, how.by);
-    let mut source = Source { code, seed, chain, key, by, from, forced, limits, last: None };
+    let mut source = StartDraws { code, seed, chain, key, by, from, forced, limits, last: None };
     // With what they are compared by, in descending order.
     let mut best: Vec<(f64, Trace)> = Vec::new();
     let mut found = 0;
@@ -210,7 +210,7 @@ pub(crate) fn starts_from(
 }
 
 /// Where draws come from.
-struct Source<'a> {
+struct StartDraws<'a> {
     code: &'a Arc<Code>,
     seed: u64,
     chain: u32,
@@ -224,7 +224,7 @@ struct Source<'a> {
     last: Option<Trace>,
 }
 
-impl Source<'_> {
+impl StartDraws<'_> {
     /// Makes a draw; `None` if the program is undefined where the kernel leads.
     fn draw(&mut self, attempt: u64) -> TraceResult<Option<Cow<'_, Trace>>> {
         let draws = Draws { key: self.key, step: attempt, substream: 0 };
@@ -333,7 +333,7 @@ mod tests {
         let key = StreamKey::new(7, 0, Purpose::START);
         let limits = Limits::default();
         let (code, from) = (&compiled_text.code, Some(&from));
-        let mut source = Source {
+        let mut source = StartDraws {
             code,
             seed: 7,
             chain: 0,

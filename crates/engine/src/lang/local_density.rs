@@ -23,11 +23,11 @@ pub const PARAMETERS: usize = 4;
 const LONGEST: usize = 96;
 
 /// The maximum number of operands of `Compute`.
-const MOST_SOURCES: usize = 256;
+const MOST_INPUTS: usize = 256;
 
 /// Where an instruction finds an input.
 #[derive(Clone, Copy, Debug)]
-pub enum Source {
+pub enum Input {
     /// A register; register 0 contains the value at which the density is evaluated.
     Register(u8),
     /// A constant or an evaluated slot.
@@ -43,32 +43,32 @@ pub enum Instruction {
     /// If the slot is evaluated, takes its value and jumps to `to`.
     Recall { slot: Slot, into: u8, to: u16 },
     /// A function of single numbers; of arrays, it is the operation in the slot.
-    Unary { slot: Slot, f: fn(f64) -> f64, x: Source, into: u8 },
+    Unary { slot: Slot, f: fn(f64) -> f64, x: Input, into: u8 },
     /// See `Unary`.
-    Binary { slot: Slot, f: fn(f64, f64) -> f64, x: Source, y: Source, into: u8 },
+    Binary { slot: Slot, f: fn(f64, f64) -> f64, x: Input, y: Input, into: u8 },
     /// See `Unary`.
-    Test { f: fn(f64, f64) -> bool, x: Source, y: Source, into: u8 },
+    Test { f: fn(f64, f64) -> bool, x: Input, y: Input, into: u8 },
     /// See `Unary`.
-    Logic { f: fn(bool) -> bool, x: Source, into: u8 },
+    Logic { f: fn(bool) -> bool, x: Input, into: u8 },
     /// An element of an array or record.
-    Index { base: Source, key: Source, into: u8 },
-    /// The operation in the slot, whose operands are `count` of the density's sources from
+    Index { base: Input, key: Input, into: u8 },
+    /// The operation in the slot, whose operands are `count` of the density's inputs from
     /// `first` on.
     Compute { slot: Slot, first: u16, count: u16, into: u8 },
     /// Jumps to `otherwise` if the condition of the selection in the slot does not hold.
-    Branch { slot: Slot, cond: Source, otherwise: u16 },
+    Branch { slot: Slot, cond: Input, otherwise: u16 },
     /// Jumps.
     Go { to: u16 },
     /// Copies a value.
-    Copy { from: Source, into: u8 },
+    Copy { from: Input, into: u8 },
     /// Scores the choice in the slot under other parameters.
-    Draw { slot: Slot, builtin: u32, parameters: [Source; PARAMETERS] },
+    Draw { slot: Slot, builtin: u32, parameters: [Input; PARAMETERS] },
     /// Scores the observation in the slot.
-    Observe { slot: Slot, builtin: u32, parameters: [Source; PARAMETERS], value: Source },
+    Observe { slot: Slot, builtin: u32, parameters: [Input; PARAMETERS], value: Input },
     /// Scores the observation in the slot under a distribution or likelihood.
-    ObserveUnder { slot: Slot, dist: Source, value: Source },
+    ObserveUnder { slot: Slot, dist: Input, value: Input },
     /// Scores the factor in the slot.
-    Factor { slot: Slot, weight: Source },
+    Factor { slot: Slot, weight: Input },
 }
 
 /// A node that an alternative of a selection holds.
@@ -90,7 +90,7 @@ pub struct LocalDensity {
     /// The instructions.
     pub instructions: Box<[Instruction]>,
     /// The operands of `Compute`.
-    pub sources: Box<[Source]>,
+    pub inputs: Box<[Input]>,
     /// The computations that depend on the value; other blocks must not read them.
     pub computations: Box<[Slot]>,
     /// What the alternatives of its selections hold. When a selection switches, it must
@@ -116,7 +116,7 @@ impl LocalDensity {
             from,
             dependent: vec![false; ops.len()],
             instructions: Vec::new(),
-            sources: Vec::new(),
+            inputs: Vec::new(),
             known: vec![None; ops.len()],
             registers: 1,
             inside: false,
@@ -129,13 +129,13 @@ impl LocalDensity {
         let (scores, computations): (Vec<Slot>, Vec<Slot>) =
             dependents.into_iter().partition(is_score);
         scores.into_iter().try_for_each(|slot| compiler.score(slot))?;
-        let Compiler { instructions, sources, mut held, computed, .. } = compiler;
+        let Compiler { instructions, inputs, mut held, computed, .. } = compiler;
         let operands: Vec<Operand> = held.iter().map(|h| h.operand).collect();
         held.iter_mut()
             .for_each(|h| h.times = operands.iter().filter(|o| **o == h.operand).count() as u32);
         Some(LocalDensity {
             instructions: instructions.into(),
-            sources: sources.into(),
+            inputs: inputs.into(),
             computations: computations.into(),
             held: held.into(),
             computed: computed.into(),
@@ -150,7 +150,7 @@ struct Compiler<'a> {
     /// By slot: whether it depends on the value.
     dependent: Vec<bool>,
     instructions: Vec<Instruction>,
-    sources: Vec<Source>,
+    inputs: Vec<Input>,
     /// By slot: the register that contains its value whenever the next instruction runs.
     known: Vec<Option<u8>>,
     registers: usize,
@@ -174,16 +174,14 @@ impl Compiler<'_> {
                 Instruction::Draw { slot, builtin: *builtin, parameters: self.parameters(args)? }
             }
             Op::Observe { dist: DistSpec::Family { builtin, args }, value, .. } => {
-                let (parameters, value) = (self.parameters(args)?, self.source(*value)?);
+                let (parameters, value) = (self.parameters(args)?, self.input(*value)?);
                 Instruction::Observe { slot, builtin: *builtin, parameters, value }
             }
             Op::Observe { dist: DistSpec::Value(dist), value, .. } => {
-                let (dist, value) = (self.source(*dist)?, self.source(*value)?);
+                let (dist, value) = (self.input(*dist)?, self.input(*value)?);
                 Instruction::ObserveUnder { slot, dist, value }
             }
-            Op::Factor { weight, .. } => {
-                Instruction::Factor { slot, weight: self.source(*weight)? }
-            }
+            Op::Factor { weight, .. } => Instruction::Factor { slot, weight: self.input(*weight)? },
             _ => return None,
         };
         self.push(instruction)?;
@@ -193,13 +191,13 @@ impl Compiler<'_> {
         Some(())
     }
 
-    fn parameters(&mut self, args: &[Operand]) -> Option<[Source; PARAMETERS]> {
+    fn parameters(&mut self, args: &[Operand]) -> Option<[Input; PARAMETERS]> {
         if args.len() > PARAMETERS {
             return None;
         }
-        let mut all = [Source::Register(0); PARAMETERS];
+        let mut all = [Input::Register(0); PARAMETERS];
         for (to, o) in all.iter_mut().zip(args) {
-            *to = self.source(*o)?;
+            *to = self.input(*o)?;
         }
         Some(all)
     }
@@ -208,32 +206,32 @@ impl Compiler<'_> {
         matches!(o, Operand::Local(s) if s == self.from || self.dependent[s])
     }
 
-    /// Returns the source of an operand's value.
-    fn source(&mut self, o: Operand) -> Option<Source> {
-        let Operand::Local(slot) = o else { return Some(Source::Operand(o)) };
+    /// Returns where the value of an operand is.
+    fn input(&mut self, o: Operand) -> Option<Input> {
+        let Operand::Local(slot) = o else { return Some(Input::Operand(o)) };
         if slot == self.from {
-            return Some(Source::Register(0));
+            return Some(Input::Register(0));
         }
         if let Some(r) = self.known[slot] {
-            return Some(Source::Register(r));
+            return Some(Input::Register(r));
         }
         if self.dependent[slot] {
             let r = self.compute(slot)?;
             self.known[slot] = Some(r);
-            return Some(Source::Register(r));
+            return Some(Input::Register(r));
         }
         if !self.inside || !self.is_computed(slot) {
-            return Some(Source::Operand(o));
+            return Some(Input::Operand(o));
         }
         let into = self.register()?;
         let recall = self.push(Instruction::Recall { slot, into, to: 0 })?;
         let known = self.known.clone();
         let r = self.compute(slot)?;
-        self.push(Instruction::Copy { from: Source::Register(r), into })?;
+        self.push(Instruction::Copy { from: Input::Register(r), into })?;
         self.known = known;
         self.land(recall);
         self.known[slot] = Some(into);
-        Some(Source::Register(into))
+        Some(Input::Register(into))
     }
 
     fn is_computed(&self, slot: Slot) -> bool {
@@ -249,7 +247,7 @@ impl Compiler<'_> {
     fn compute(&mut self, slot: Slot) -> Option<u8> {
         match &self.ops[slot] {
             Op::Prim { builtin, args } if self.is_on_numbers(*builtin) => {
-                let mut arg = |i: usize| self.source(*args.get(i)?);
+                let mut arg = |i: usize| self.input(*args.get(i)?);
                 let (x, y) = (arg(0)?, arg(1));
                 let into = self.register()?;
                 let instruction = match (self.builtins.get(*builtin).scalar?, y) {
@@ -263,7 +261,7 @@ impl Compiler<'_> {
                 Some(into)
             }
             Op::Index { base, keys } if keys.len() == 1 => {
-                let (base, key) = (self.source(*base)?, self.source(keys[0])?);
+                let (base, key) = (self.input(*base)?, self.input(keys[0])?);
                 let into = self.register()?;
                 self.push(Instruction::Index { base, key, into })?;
                 Some(into)
@@ -271,7 +269,7 @@ impl Compiler<'_> {
             Op::Select { cond, then, otherwise } => {
                 let (cond, then, otherwise) = (*cond, *then, *otherwise);
                 let chosen = self.depends(cond);
-                let cond = self.source(cond)?;
+                let cond = self.input(cond)?;
                 let into = self.register()?;
                 let branch = self.push(Instruction::Branch { slot, cond, otherwise: 0 })?;
                 self.alternative(then, into)?;
@@ -288,13 +286,13 @@ impl Compiler<'_> {
             op if self.is_computed(slot) => {
                 let mut operands: SmallVec<[Operand; 8]> = SmallVec::new();
                 op.operands(|o| operands.push(o));
-                let found = operands.iter().map(|o| self.source(*o));
-                let found: SmallVec<[Source; 8]> = found.collect::<Option<_>>()?;
-                let (first, count) = (self.sources.len() as u16, found.len() as u16);
-                self.sources.extend(found);
+                let found = operands.iter().map(|o| self.input(*o));
+                let found: SmallVec<[Input; 8]> = found.collect::<Option<_>>()?;
+                let (first, count) = (self.inputs.len() as u16, found.len() as u16);
+                self.inputs.extend(found);
                 let into = self.register()?;
                 self.push(Instruction::Compute { slot, first, count, into })?;
-                (self.sources.len() <= MOST_SOURCES).then_some(into)
+                (self.inputs.len() <= MOST_INPUTS).then_some(into)
             }
             _ => None,
         }
@@ -311,7 +309,7 @@ impl Compiler<'_> {
 
     fn alternative(&mut self, o: Operand, into: u8) -> Option<()> {
         let (known, inside) = (self.known.clone(), std::mem::replace(&mut self.inside, true));
-        let from = self.source(o)?;
+        let from = self.input(o)?;
         self.push(Instruction::Copy { from, into })?;
         (self.known, self.inside) = (known, inside);
         Some(())

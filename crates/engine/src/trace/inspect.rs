@@ -254,7 +254,7 @@ impl Trace {
     /// The same, with the nodes of the observations.
     fn likelihoods_at(&self) -> impl Iterator<Item = (NodeId, &dyn Likelihood, &Value)> {
         self.scored_nodes().filter_map(|n| {
-            let Op::Observe { dist: DistSpec::Value(o), value, .. } = self.graph.op(n) else {
+            let Op::Observe { dist: DistSpec::Value(o), .. } = self.graph.op(n) else {
                 return None;
             };
             let frame = self.graph.store[n].frame;

@@ -9,7 +9,6 @@
 
 use super::node::NodeId;
 use super::{Address, Change, Constraint, Draws, Selector, Target, Trace, TraceResult, Weight};
-use crate::lang::code::Op;
 use crate::lang::error::{FaultKind, RunError};
 use crate::lang::value::Value;
 use pcadlang_numerics::dist::Datum;
@@ -257,9 +256,7 @@ impl Trace {
 
     /// Returns the observed value at an address.
     fn observed_at(&self, address: &Address, nodes: &FxHashMap<u64, NodeId>) -> Option<Value> {
-        let n = *nodes.get(&address.hash64())?;
-        let Op::Observe { value, .. } = self.graph.op(n) else { return None };
-        Some(self.graph.observed_value(n).clone())
+        Some(self.graph.observed_value(*nodes.get(&address.hash64())?).clone())
     }
 
     fn unknown(&self, address: &Address) -> Box<RunError> {

@@ -94,7 +94,7 @@ pub fn geweke(
         simulate(code, settings, i).map(|mut s| read(&quantities, &mut s.trace))
     })?;
     let successive = each(settings, 0..chains, |i| {
-        let callback = Arc::new(Turns {
+        let callback = Arc::new(Alternating {
             code: Arc::clone(code),
             quantities: Arc::clone(&quantities),
             settings: settings.clone(),
@@ -124,7 +124,7 @@ fn read(quantities: &Quantities, trace: &mut Trace) -> Vec<f64> {
 
 /// Reads the state at every draw of a chain, and then redraws the data.
 #[derive(Debug)]
-struct Turns {
+struct Alternating {
     code: Arc<Code>,
     quantities: Arc<Quantities>,
     settings: Settings,
@@ -138,7 +138,7 @@ struct Taken {
     failed: Option<CalibrationError>,
 }
 
-impl Callback for Turns {
+impl Callback for Alternating {
     fn draw(&self, chain: u32, trace: &mut Trace, _: Draws) {
         let mut taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
         if taken.failed.is_some() {
@@ -153,7 +153,7 @@ impl Callback for Turns {
     }
 }
 
-impl Turns {
+impl Alternating {
     /// The first turn replaces the state after warm-up by a draw of the joint
     /// distribution; what the kernels have adapted is kept. Later turns read the state
     /// and redraw the data.

@@ -16,7 +16,7 @@ mod sbc;
 pub(crate) mod simulate;
 
 pub use geweke::{Geweke, GewekeRow, geweke};
-pub use sampler::{KernelSampler, PlanSampler, Sampler};
+pub use sampler::{PlanSampler, Sampler};
 pub use sbc::{RANKS, Sbc, SbcRow, sbc};
 
 use super::parallel::in_parallel;

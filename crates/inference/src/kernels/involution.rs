@@ -18,7 +18,7 @@
 //! read choices that are proposed beside it, or it is not an involution.
 
 use super::program_kernel::{
-    Image, Played, ProgramKernel, Source, log_density, log_volume, sampled, values,
+    AuxiliaryValues, Image, Played, ProgramKernel, log_density, log_volume, sampled, values,
 };
 use crate::calls::error::fail;
 use crate::calls::formula::Moved;
@@ -107,7 +107,7 @@ impl ProgramKernel {
     ) -> TraceResult<Outcome> {
         trace.rollback();
         let mut rng = at.stream();
-        let forth = self.play(trace, at, Source::Drawn(&mut rng), none(aside))?;
+        let forth = self.play(trace, at, AuxiliaryValues::Drawn(&mut rng), none(aside))?;
         let forth_map = mapped(&forth, trace);
         let log_jacobian = self.log_jacobian((trace, aside), at, &forth, &forth_map)?;
         let (mut changes, mut undo) = (Vec::new(), Vec::new());
@@ -139,7 +139,8 @@ impl ProgramKernel {
         trace.commit();
         let auxiliaries: Vec<Value> =
             forth_map.iter().filter(|m| m.choice.is_none()).map(|m| m.new.clone()).collect();
-        let back = recoverable(self.play(trace, at, Source::Given(&auxiliaries), none(aside)));
+        let back =
+            recoverable(self.play(trace, at, AuxiliaryValues::Given(&auxiliaries), none(aside)));
         let (log_back, wrong) = match &back {
             Ok(Some(back))
                 if back.all.iter().map(|p| p.target).eq(forth.all.iter().map(|p| p.target)) =>
@@ -229,7 +230,8 @@ impl ProgramKernel {
                     .collect();
                 let auxiliaries = &values[choices.len()..];
                 let moved = Moved { choices: &choices, aside };
-                let there = self.play(trace, at, Source::Moved(auxiliaries), Some(moved))?;
+                let there =
+                    self.play(trace, at, AuxiliaryValues::Moved(auxiliaries), Some(moved))?;
                 let image = at_new(&mapped(&there, trace), |m| &m.new);
                 if image.len() != n || there.drawn.len() != played.drawn.len() {
                     return Err(

@@ -80,7 +80,7 @@ impl Played {
 }
 
 /// Where the values of auxiliary variables come from.
-pub(super) enum Source<'a> {
+pub(super) enum AuxiliaryValues<'a> {
     Drawn(&'a mut Stream),
     Given(&'a [Value]),
     /// Given, when only the map is evaluated and proposals beside it are skipped.
@@ -110,7 +110,7 @@ impl ProgramKernel {
         &self,
         trace: &mut Trace,
         at: &StepContext,
-        source: Source,
+        source: AuxiliaryValues,
         moved: Option<Moved>,
     ) -> TraceResult<Played> {
         let key = StreamKey::new(at.seed, at.chain, Purpose::PREDICT);
@@ -137,7 +137,7 @@ impl ProgramKernel {
             .map(|(p, x)| Some((p.address.clone(), Value::from_datum(x.as_ref()?))));
         let moved: Vec<(Address, Value)> = moved.collect::<Option<_>>()?;
         let moved = Moved { choices: &moved, aside };
-        self.play(trace, at, Source::Given(auxiliaries), Some(moved)).ok()
+        self.play(trace, at, AuxiliaryValues::Given(auxiliaries), Some(moved)).ok()
     }
 
     /// Whether what the body proposes depends on its arguments alone, not on the state.
@@ -184,7 +184,7 @@ impl ProgramKernel {
         at: &StepContext,
     ) -> TraceResult<Vec<(u64, Constraint)>> {
         let mut rng = at.stream();
-        let forth = self.play(trace, at, Source::Drawn(&mut rng), None)?;
+        let forth = self.play(trace, at, AuxiliaryValues::Drawn(&mut rng), None)?;
         let value = |p: &Proposed| {
             (trace.address_hash(p.target), Constraint::Value(p.dist.sample(&mut rng)))
         };
@@ -204,7 +204,7 @@ impl ProgramKernel {
             return Err(fail(self.declared().name.span, message.into()));
         }
         let mut rng = at.stream();
-        let forth = self.play(trace, at, Source::Drawn(&mut rng), None)?;
+        let forth = self.play(trace, at, AuxiliaryValues::Drawn(&mut rng), None)?;
         let (_, changes) = sampled(&forth.all, &mut rng);
         let led = recoverable(trace.propose(&changes, at.draws(0)))?;
         if led.is_some() {
@@ -220,7 +220,7 @@ struct Play<'a> {
     variables: Vec<Value>,
     draws: Draws,
     steps: u64,
-    source: Source<'a>,
+    source: AuxiliaryValues<'a>,
     moved: Option<Moved<'a>>,
     played: Played,
 }
@@ -263,7 +263,7 @@ impl Play<'_> {
                     let value = self.auxiliary(&name.node, dist)?;
                     self.variables.push(value);
                 }
-                StepKind::Propose(..) if matches!(self.source, Source::Moved(_)) => {}
+                StepKind::Propose(..) if matches!(self.source, AuxiliaryValues::Moved(_)) => {}
                 StepKind::Propose(target, dist) => {
                     let proposed = self.proposed(target, dist)?;
                     let mapped = |i: &(Image, Value)| matches!(i.0, Image::Choice(_, t) if t == proposed.target);
@@ -308,8 +308,8 @@ impl Play<'_> {
     fn auxiliary(&mut self, name: &Arc<str>, dist: &Formula) -> TraceResult<Value> {
         let dist = self.distribution(dist)?;
         let value = match &mut self.source {
-            Source::Drawn(rng) => Value::from_datum(&dist.sample(rng)),
-            Source::Given(values) | Source::Moved(values) => {
+            AuxiliaryValues::Drawn(rng) => Value::from_datum(&dist.sample(rng)),
+            AuxiliaryValues::Given(values) | AuxiliaryValues::Moved(values) => {
                 values.get(self.played.drawn.len()).cloned().unwrap_or_default()
             }
         };
@@ -436,7 +436,7 @@ impl ProgramKernel {
         at: &StepContext,
     ) -> TraceResult<Outcome> {
         let mut rng: Stream = at.stream();
-        let forth = self.play(trace, at, Source::Drawn(&mut rng), None)?;
+        let forth = self.play(trace, at, AuxiliaryValues::Drawn(&mut rng), None)?;
         if forth.all.is_empty() {
             return Ok(Outcome::default());
         }
@@ -476,7 +476,7 @@ impl ProgramKernel {
         // The replay reads the new state, which must be committed for that.
         let removed = trace.removed();
         trace.commit();
-        let back = recoverable(self.play(trace, at, Source::Given(&auxiliaries), None))?;
+        let back = recoverable(self.play(trace, at, AuxiliaryValues::Given(&auxiliaries), None))?;
         if accepts(ratio(trace, back), &mut rng) {
             return Ok(Outcome::one(true));
         }

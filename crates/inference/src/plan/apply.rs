@@ -1,6 +1,6 @@
 //! Applies kernels: one call, step by step, and the arms of `mix`.
 
-use super::place::Doing;
+use super::place::ResumePoint;
 use super::runner::{Flow, Instance, Runner};
 use crate::calls::build::{Setting, arguments, build};
 use crate::calls::error::fail;
@@ -24,10 +24,10 @@ impl<'a> Runner<'a> {
     pub(super) fn mix(
         &mut self,
         arms: &'a [(Formula, Step)],
-        doing: Doing,
+        point: ResumePoint,
     ) -> Result<Flow, ChainError> {
-        if let Doing::Kernel { arm: Some(i), .. } = doing {
-            return arms.get(i).map_or(Ok(Flow::Next), |a| self.statement(&a.1, Some(i), doing));
+        if let ResumePoint::Kernel { arm: Some(i), .. } = point {
+            return arms.get(i).map_or(Ok(Flow::Next), |a| self.statement(&a.1, Some(i), point));
         }
         let mut weights: SmallVec<[f64; 8]> = SmallVec::new();
         for (weight, _) in arms {
@@ -42,7 +42,7 @@ impl<'a> Runner<'a> {
         let total: f64 = weights.iter().sum();
         let key = StreamKey::new(self.options.seed, self.chain, Purpose::MIX);
         let arm = key.stream(self.step, 0, 0).weighted(&weights, total);
-        arms.get(arm).map_or(Ok(Flow::Next), |a| self.statement(&a.1, Some(arm), doing))
+        arms.get(arm).map_or(Ok(Flow::Next), |a| self.statement(&a.1, Some(arm), point))
     }
 
     /// Applies a kernel; `arm` is its index in a `mix`.
@@ -50,7 +50,7 @@ impl<'a> Runner<'a> {
         &mut self,
         call: &'a KernelCall,
         arm: Option<usize>,
-        doing: Doing,
+        point: ResumePoint,
     ) -> Result<Flow, ChainError> {
         let i = match (self.calls.get(call.index), call.kernel) {
             (Some(Some(i)), _) => *i,
@@ -63,8 +63,8 @@ impl<'a> Runner<'a> {
             self.pause();
         }
         let begun = Instant::now();
-        let (mut steps, after, mut done) = match doing {
-            Doing::Kernel { steps, after, done, .. } => (steps, after, done),
+        let (mut steps, after, mut done) = match point {
+            ResumePoint::Kernel { steps, after, done, .. } => (steps, after, done),
             _ => (0, None, Outcome::default()),
         };
         // A kernel that does not sweep over its choices makes one step.
@@ -83,7 +83,7 @@ impl<'a> Runner<'a> {
                 self.asked = asked;
                 let kernel = self.instances[i].kernel.as_mut();
                 let after = kernel.and_then(|k| k.visited(&self.trace));
-                self.keep(Some(Doing::Kernel { arm, steps, after, done }))?;
+                self.keep(Some(ResumePoint::Kernel { arm, steps, after, done }))?;
             }
         }
         if !self.in_warmup {
@@ -106,7 +106,7 @@ impl<'a> Runner<'a> {
             return Err(fail(call.span, message).into());
         }
         let declared = &self.plan.kernels[k];
-        self.note(Doing::Kernel { arm, steps: 0, after: None, done: Outcome::default() });
+        self.note(ResumePoint::Kernel { arm, steps: 0, after: None, done: Outcome::default() });
         let depth = self.depth();
         if self.resume_path.is_empty() {
             let given = arguments(declared, call, &mut self.env())?;

@@ -14,15 +14,16 @@ pub(super) struct PlanPosition {
     /// The number of variables when it began.
     pub depth: usize,
     /// How far it has got.
-    pub doing: Doing,
+    #[serde(rename = "doing")]
+    pub point: ResumePoint,
 }
 
 impl PlanPosition {
     /// The largest of its counts.
     pub fn most(&self) -> u64 {
-        match &self.doing {
-            Doing::Loop { pass, of, first } => (*pass).max(*of).max(*first),
-            Doing::Kernel { steps, .. } => *steps as u64,
+        match &self.point {
+            ResumePoint::Loop { pass, of, first } => (*pass).max(*of).max(*first),
+            ResumePoint::Kernel { steps, .. } => *steps as u64,
             _ => 0,
         }
     }
@@ -30,7 +31,7 @@ impl PlanPosition {
 
 /// How far a statement has got.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) enum Doing {
+pub(super) enum ResumePoint {
     /// It is at its beginning.
     #[default]
     Begins,

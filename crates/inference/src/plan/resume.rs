@@ -1,7 +1,7 @@
 //! Interrupting a chain and resuming it: from a runner to a checkpoint, and back.
 
 use super::checkpoint::{Checkpoint, SavedKernel};
-use super::place::Doing;
+use super::place::ResumePoint;
 use super::runner::{Instance, Runner};
 use crate::draws::Sink;
 use crate::plain::Plain;
@@ -16,15 +16,15 @@ use std::sync::Arc;
 use std::time::Duration;
 
 impl<'a> Runner<'a> {
-    /// The checkpoint of a chain now, inside a statement that has got as far as `doing`;
+    /// The checkpoint of a chain now, inside a statement that has got as far as `point`;
     /// `None` if any of its variables is not plain data.
-    pub fn checkpoint(&self, doing: Option<Doing>) -> Option<Checkpoint> {
+    pub fn checkpoint(&self, point: Option<ResumePoint>) -> Option<Checkpoint> {
         let variables = self.variables.iter().map(Plain::of).collect::<Option<_>>()?;
         let mut path = self.path.clone();
-        if let (Some(last), Some(doing)) = (path.last_mut(), doing) {
-            last.doing = doing;
+        if let (Some(last), Some(point)) = (path.last_mut(), point) {
+            last.point = point;
         }
-        if path.iter().any(|p| matches!(p.doing, Doing::Items { all: None, .. })) {
+        if path.iter().any(|p| matches!(p.point, ResumePoint::Items { all: None, .. })) {
             return None;
         }
         let kernel = |i: &Instance| {

@@ -1,6 +1,6 @@
 //! Runs a plan on a chain, step by step.
 
-use super::place::{Doing, PlanPosition};
+use super::place::{PlanPosition, ResumePoint};
 use crate::calls::error::fail;
 use crate::calls::formula::{PlanEnv, evaluate};
 use crate::calls::selection::selector;
@@ -242,12 +242,12 @@ impl<'a> Runner<'a> {
             let place = back.take().unwrap_or(PlanPosition {
                 statement,
                 depth: self.variables.len(),
-                doing: Doing::Begins,
+                point: ResumePoint::Begins,
             });
-            let doing = place.doing.clone();
+            let point = place.point.clone();
             self.path.truncate(level);
             self.path.push(place);
-            match self.statement(s, None, doing)? {
+            match self.statement(s, None, point)? {
                 Flow::Next => {}
                 flow => {
                     self.path.truncate(level);
@@ -260,9 +260,9 @@ impl<'a> Runner<'a> {
     }
 
     /// Records how far the present statement has got.
-    pub fn note(&mut self, doing: Doing) {
+    pub fn note(&mut self, point: ResumePoint) {
         if let Some(place) = self.path.last_mut() {
-            place.doing = doing;
+            place.point = point;
         }
     }
 
@@ -285,8 +285,8 @@ impl<'a> Runner<'a> {
     /// The innermost loop that counts its passes: the pass, their number, and the step at
     /// which it began.
     pub fn innermost(&self) -> Option<(u64, u64, u64)> {
-        self.path.iter().rev().find_map(|p| match p.doing {
-            Doing::Loop { pass, of, first } => Some((pass, of, first)),
+        self.path.iter().rev().find_map(|p| match p.point {
+            ResumePoint::Loop { pass, of, first } => Some((pass, of, first)),
             _ => None,
         })
     }
@@ -296,13 +296,13 @@ impl<'a> Runner<'a> {
         &mut self,
         s: &'a Step,
         arm: Option<usize>,
-        doing: Doing,
+        point: ResumePoint,
     ) -> Result<Flow, ChainError> {
         match &s.kind {
             StepKind::Init(_) => Ok(Flow::Next),
             StepKind::Anneal(from) => self.anneal(from, s.span),
-            StepKind::Warmup(count, body) => self.warmup(count, body, doing),
-            StepKind::Repeat(count, body) => self.repeat(count, body, doing),
+            StepKind::Warmup(count, body) => self.warmup(count, body, point),
+            StepKind::Repeat(count, body) => self.repeat(count, body, point),
             StepKind::Every(count, body) => {
                 // When resuming within the body, it is known to be due.
                 if !self.resume_path.is_empty() {
@@ -314,10 +314,10 @@ impl<'a> Runner<'a> {
                     _ => Ok(Flow::Next),
                 }
             }
-            StepKind::Mix(arms) => self.mix(arms, doing),
+            StepKind::Mix(arms) => self.mix(arms, point),
             StepKind::For(items, variable, body) => {
-                let (begin, items) = match doing {
-                    Doing::Items { item, all: Some(all) } => {
+                let (begin, items) = match point {
+                    ResumePoint::Items { item, all: Some(all) } => {
                         (item, all.iter().map(Plain::value).collect())
                     }
                     _ => (0, self.value(items)?.passes()),
@@ -325,7 +325,7 @@ impl<'a> Runner<'a> {
                 let all: Option<Vec<Plain>> = items.iter().map(Plain::of).collect();
                 let all: Option<Arc<[Plain]>> = all.map(Arc::from);
                 for (item, value) in items.into_iter().enumerate().skip(begin) {
-                    self.note(Doing::Items { item, all: all.clone() });
+                    self.note(ResumePoint::Items { item, all: all.clone() });
                     if self.resume_path.is_empty() {
                         self.bind(*variable, value);
                     }
@@ -364,15 +364,19 @@ impl<'a> Runner<'a> {
             | StepKind::MapDrawn(..) => {
                 Err(fail(s.span, "`propose` belongs in a kernel".into()).into())
             }
-            StepKind::Apply(call) => self.apply(call, arm, doing),
+            StepKind::Apply(call) => self.apply(call, arm, point),
         }
     }
 
     /// The pass, the number of passes and the first step of a loop: at its beginning, or
     /// where a checkpoint resumes.
-    pub fn passes(&mut self, count: &Formula, doing: Doing) -> Result<(u64, u64, u64), ChainError> {
-        match doing {
-            Doing::Loop { pass, of, first } => Ok((pass, of, first)),
+    pub fn passes(
+        &mut self,
+        count: &Formula,
+        point: ResumePoint,
+    ) -> Result<(u64, u64, u64), ChainError> {
+        match point {
+            ResumePoint::Loop { pass, of, first } => Ok((pass, of, first)),
             _ => Ok((0, self.count(count)?, self.step)),
         }
     }
@@ -381,9 +385,9 @@ impl<'a> Runner<'a> {
         &mut self,
         count: &Formula,
         body: &'a [Step],
-        doing: Doing,
+        point: ResumePoint,
     ) -> Result<Flow, ChainError> {
-        let (mut i, passes, first) = self.passes(count, doing)?;
+        let (mut i, passes, first) = self.passes(count, point)?;
         let outermost = self.loops == 0 && !self.in_warmup;
         let unbounded = outermost && (self.options.steps.is_some() || self.options.time.is_some());
         while i < passes || unbounded && (i == 0 || self.step > first) {
@@ -407,7 +411,7 @@ impl<'a> Runner<'a> {
         (i, of, first): (u64, u64, u64),
         body: &'a [Step],
     ) -> Result<Flow, ChainError> {
-        self.note(Doing::Loop { pass: i, of, first });
+        self.note(ResumePoint::Loop { pass: i, of, first });
         if self.loops == 0 {
             self.progress.pass.store(i, Ordering::Relaxed);
             self.progress.passes.store(of, Ordering::Relaxed);
@@ -456,13 +460,13 @@ impl<'a> Runner<'a> {
     }
 
     /// Passes a checkpoint to the sink, if it takes any: at the beginning of the present
-    /// statement, or as far in it as `doing` says. A chain with variables that are not
+    /// statement, or as far in it as `point` says. A chain with variables that are not
     /// plain data has no checkpoints.
-    pub fn keep(&mut self, doing: Option<Doing>) -> Result<(), ChainError> {
+    pub fn keep(&mut self, point: Option<ResumePoint>) -> Result<(), ChainError> {
         if !self.sink.takes_checkpoints() {
             return Ok(());
         }
-        if let Some(checkpoint) = self.checkpoint(doing) {
+        if let Some(checkpoint) = self.checkpoint(point) {
             self.sink.checkpoint(&checkpoint).map_err(ChainError::Sink)?;
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! Warm-up: loops whose draws are discarded, in which kernels adapt and the likelihood
 //! may be annealed.
 
-use super::place::Doing;
+use super::place::ResumePoint;
 use super::runner::{Flow, Runner};
 use crate::calls::error::fail;
 use crate::run::ChainError;
@@ -16,9 +16,9 @@ impl<'a> Runner<'a> {
         &mut self,
         count: &Formula,
         body: &'a [Step],
-        doing: Doing,
+        point: ResumePoint,
     ) -> Result<Flow, ChainError> {
-        let (mut i, passes, first) = self.passes(count, doing)?;
+        let (mut i, passes, first) = self.passes(count, point)?;
         self.in_warmup = true;
         self.progress.warming.fetch_add(1, Ordering::Relaxed);
         let mut flow = Flow::Next;

@@ -7,26 +7,44 @@ use super::*;
 use crate::num::{Column, ExactSum};
 use std::fmt;
 
+/// Where the log densities of a batch go.
+#[derive(Debug)]
+pub enum To<'a> {
+    /// They are added to a sum.
+    Sum(&'a mut ExactSum),
+    /// They are written to the buffer, from here on.
+    Places(usize),
+}
+
+/// What the derivatives of the log densities of a batch are multiplied by.
+#[derive(Clone, Copy, Debug)]
+pub enum Weights {
+    /// One number for all.
+    All(f64),
+    /// The adjoints of the log densities, which are among the adjoints from here on.
+    Places(usize),
+}
+
 /// Numbers under distributions of one family. Columns of parameters are in the order of
 /// the constructor; without columns, the parameters stay as they were when the batch was
 /// made.
 pub trait Batch: fmt::Debug + Send + Sync {
-    /// Adds the log densities of `n` numbers to a sum. Returns false, with part of them
-    /// added, if a number is NaN or a parameter is outside its domain.
+    /// Computes the log densities of `n` numbers. Returns false, with part of them done, if
+    /// a number is NaN or a parameter is outside its domain.
     fn score(
         &mut self,
-        buffer: &[f64],
+        buffer: &mut [f64],
         x: Column,
         params: &[Column],
         n: usize,
-        sum: &mut ExactSum,
+        to: To<'_>,
     ) -> bool;
 
     /// Appends the log densities of the numbers of the last `score`, one by one.
     fn each(&self, buffer: &[f64], x: Column, n: usize, out: &mut Vec<f64>);
 
-    /// Adds `weight` times the derivatives of the log densities of the last `score` to
-    /// the adjoints, which are laid out like the buffer.
+    /// Adds the weighted derivatives of the log densities of the last `score` to the
+    /// adjoints, which are laid out like the buffer.
     fn vjp(
         &self,
         buffer: &[f64],
@@ -34,30 +52,7 @@ pub trait Batch: fmt::Debug + Send + Sync {
         x: Column,
         params: &[Column],
         n: usize,
-        weight: f64,
-    );
-
-    /// Writes the log densities of `n` numbers to the buffer, from `out` on. Returns false
-    /// if a number is NaN or a parameter is outside its domain.
-    fn score_each(
-        &mut self,
-        buffer: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
-    ) -> bool;
-
-    /// Adds the derivatives of the log densities of the last `score_each` to the
-    /// adjoints, each times the adjoint of its log density.
-    fn vjp_each(
-        &self,
-        buffer: &[f64],
-        by: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
+        weights: Weights,
     );
 }
 
@@ -172,21 +167,58 @@ impl<T: Member<N>, const N: usize> Members<T, N> {
         let each = usize::from(self.0.len() != 1);
         (0..n).map(move |i| (x.get(buffer, i), &self.0[i * each].1))
     }
+}
 
-    /// Adds the derivatives of the log densities, times `all`, and times the adjoint of
-    /// each, of which the first is at `weights`, if there are any.
-    fn add_slopes(
+impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
+    fn score(
+        &mut self,
+        buffer: &mut [f64],
+        x: Column,
+        params: &[Column],
+        n: usize,
+        to: To<'_>,
+    ) -> bool {
+        if !self.refresh(buffer, params) {
+            return false;
+        }
+        let mut there = true;
+        let mut one = |(x, d): (f64, &T)| {
+            there &= !x.is_nan();
+            d.log_density(x)
+        };
+        match to {
+            To::Sum(sum) => sum.add_each(self.numbers(buffer, x, n).map(one)),
+            To::Places(out) => {
+                // What is read is before what is written.
+                let (before, out) = buffer.split_at_mut(out);
+                let each = out.iter_mut().zip(self.numbers(before, x, n));
+                each.for_each(|(out, number)| *out = one(number));
+            }
+        }
+        there
+    }
+
+    fn each(&self, buffer: &[f64], x: Column, n: usize, out: &mut Vec<f64>) {
+        out.extend(self.numbers(buffer, x, n).map(|(x, d)| d.log_density(x)));
+    }
+
+    fn vjp(
         &self,
         buffer: &[f64],
         by: &mut [f64],
-        (x, params, n): (Column, &[Column], usize),
-        weights: Option<usize>,
-        all: f64,
+        x: Column,
+        params: &[Column],
+        n: usize,
+        weights: Weights,
     ) {
+        let (from, all) = match weights {
+            Weights::All(weight) => (None, weight),
+            Weights::Places(from) => (Some(from), 1.0),
+        };
         let columns = <&[Column; N]>::try_from(params).ok();
         let (mut of_x, mut of_params) = (0.0, [0.0; N]);
         for (i, (at, d)) in self.numbers(buffer, x, n).enumerate() {
-            let weight = weights.map_or(1.0, |from| by[from + i]);
+            let weight = from.map_or(1.0, |from| by[from + i]);
             // An infinite slope does not matter there.
             if weight == 0.0 {
                 continue;
@@ -209,76 +241,6 @@ impl<T: Member<N>, const N: usize> Members<T, N> {
         {
             by[c.at] += of_params[k] * all;
         }
-    }
-}
-
-impl<T: Member<N>, const N: usize> Batch for Members<T, N> {
-    fn score(
-        &mut self,
-        buffer: &[f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        sum: &mut ExactSum,
-    ) -> bool {
-        if !self.refresh(buffer, params) {
-            return false;
-        }
-        let mut there = true;
-        sum.add_each(self.numbers(buffer, x, n).map(|(x, d)| {
-            there &= !x.is_nan();
-            d.log_density(x)
-        }));
-        there
-    }
-
-    fn each(&self, buffer: &[f64], x: Column, n: usize, out: &mut Vec<f64>) {
-        out.extend(self.numbers(buffer, x, n).map(|(x, d)| d.log_density(x)));
-    }
-
-    fn vjp(
-        &self,
-        buffer: &[f64],
-        by: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        weight: f64,
-    ) {
-        self.add_slopes(buffer, by, (x, params, n), None, weight);
-    }
-
-    fn score_each(
-        &mut self,
-        buffer: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
-    ) -> bool {
-        if !self.refresh(buffer, params) {
-            return false;
-        }
-        // What is read is before what is written.
-        let (before, out) = buffer.split_at_mut(out);
-        let mut there = true;
-        for (out, (x, d)) in out.iter_mut().zip(self.numbers(before, x, n)) {
-            there &= !x.is_nan();
-            *out = d.log_density(x);
-        }
-        there
-    }
-
-    fn vjp_each(
-        &self,
-        buffer: &[f64],
-        by: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
-    ) {
-        self.add_slopes(buffer, by, (x, params, n), Some(out), 1.0);
     }
 }
 

@@ -24,7 +24,7 @@ mod support;
 mod tails;
 mod transform;
 
-pub use batch::Batch;
+pub use batch::{Batch, To, Weights};
 pub use continuous::*;
 pub use datum::Datum;
 pub use discrete::*;

@@ -1,12 +1,12 @@
 //! Batches of normal distributions: the same arithmetic as [`Normal`]'s, in loops over
 //! columns that the compiler can vectorise.
 
-use super::batch::{component, parts};
+use super::batch::{To, Weights, component, parts};
 use super::continuous::log_norm;
 use super::draw::standard;
 use super::{Batch, Dist, Normal};
+use crate::num::Column;
 use crate::num::simd::{sum_of_triples, vectorised_if_many};
-use crate::num::{Column, ExactSum};
 
 /// Creates the batch of a scalar distribution, or of a distribution whose elements are
 /// all of one family. Its parameters lie in these columns, or are fixed. `None` for other
@@ -220,15 +220,17 @@ impl Normals {
 impl Batch for Normals {
     fn score(
         &mut self,
-        buffer: &[f64],
+        buffer: &mut [f64],
         x: Column,
         params: &[Column],
         n: usize,
-        sum: &mut ExactSum,
+        to: To<'_>,
     ) -> bool {
         let there = self.compute(buffer, x, params, n);
-        if there {
-            sum.add_all(&self.terms);
+        match to {
+            _ if !there => {}
+            To::Sum(sum) => sum.add_all(&self.terms),
+            To::Places(out) => buffer[out..out + n].copy_from_slice(&self.terms),
         }
         there
     }
@@ -237,37 +239,23 @@ impl Batch for Normals {
         out.extend_from_slice(&self.terms);
     }
 
-    fn vjp(&self, _: &[f64], by: &mut [f64], x: Column, params: &[Column], _: usize, weight: f64) {
-        self.add_slopes(by, (x, params), (&self.z, |_| 1.0), weight);
-    }
-
-    fn score_each(
-        &mut self,
-        buffer: &mut [f64],
-        x: Column,
-        params: &[Column],
-        n: usize,
-        out: usize,
-    ) -> bool {
-        let there = self.compute(buffer, x, params, n);
-        if there {
-            buffer[out..out + n].copy_from_slice(&self.terms);
-        }
-        there
-    }
-
-    fn vjp_each(
+    fn vjp(
         &self,
         _: &[f64],
         by: &mut [f64],
         x: Column,
         params: &[Column],
         n: usize,
-        out: usize,
+        weights: Weights,
     ) {
-        // What is read is before what is written.
-        let (by, weights) = by.split_at_mut(out);
-        self.add_slopes(by, (x, params), (&weights[..n], |w| w), 1.0);
+        match weights {
+            Weights::All(weight) => self.add_slopes(by, (x, params), (&self.z, |_| 1.0), weight),
+            Weights::Places(from) => {
+                // What is read is before what is written.
+                let (by, weights) = by.split_at_mut(from);
+                self.add_slopes(by, (x, params), (&weights[..n], |w| w), 1.0);
+            }
+        }
     }
 }
 
@@ -301,10 +289,10 @@ mod tests {
             let mut plain = super::super::families::component(&parts, 2).unwrap();
             let score = |batch: &mut dyn Batch| {
                 let mut own = buffer.clone();
-                assert!(batch.score_each(&mut own, x, &params, n, 3 * n));
+                assert!(batch.score(&mut own, x, &params, n, To::Places(3 * n)));
                 let mut by = vec![0.0; 3 * n];
                 by.extend(&weights);
-                batch.vjp_each(&own, &mut by, x, &params, n, 3 * n);
+                batch.vjp(&own, &mut by, x, &params, n, Weights::Places(3 * n));
                 by.truncate(3 * n);
                 (own, by)
             };
@@ -328,7 +316,8 @@ mod tests {
                 let mut own = buffer.clone();
                 own[at] = bad;
                 for batch in [&mut normals as &mut dyn Batch, &mut *plain] {
-                    assert_eq!(batch.score_each(&mut own, x, &params, n, 3 * n), !read, "{at}");
+                    let there = batch.score(&mut own, x, &params, n, To::Places(3 * n));
+                    assert_eq!(there, !read, "{at}");
                 }
             }
         }

@@ -7,7 +7,7 @@ use crate::lang::adjoint::Adjoint;
 use crate::lang::builtins::{Binary, Builtin, PreviousEvaluation, Reduction, times};
 use crate::lang::density;
 use crate::lang::value::Value;
-use pcadlang_numerics::dist::{Batch, Datum, Dist};
+use pcadlang_numerics::dist::{Batch, Datum, Dist, To, Weights};
 use pcadlang_numerics::num::simd::{sum_of_triples, vectorised_if_many};
 use pcadlang_numerics::num::{Column, ExactSum};
 use smallvec::SmallVec;
@@ -157,10 +157,10 @@ impl Op {
                 there
             }
             Op::Guard { form, value } => form.value(values).is_some_and(|now| now.same(value)),
-            Op::Density { batch, x, params, n, observed, out, .. } => match out {
-                Some(out) => batch.score_each(v, *x, params, *n, *out),
-                None => batch.score(v, *x, params, *n, sums.of(*observed)),
-            },
+            Op::Density { batch, x, params, n, observed, out, .. } => {
+                let to = out.map_or_else(|| To::Sum(sums.of(*observed)), To::Places);
+                batch.score(v, *x, params, *n, to)
+            }
             Op::Score { dist, x, observed, out, last } => {
                 let (Some(dist), Some(x)) = (dist.value(values), x.value(values)) else {
                     return false;
@@ -248,10 +248,8 @@ impl Op {
             }
             Op::Guard { .. } => true,
             Op::Density { batch, x, params, n, observed, out, .. } => {
-                match out {
-                    Some(out) => batch.vjp_each(v, g, *x, params, *n, *out),
-                    None => batch.vjp(v, g, *x, params, *n, weight(*observed)),
-                }
+                let weights = out.map_or(Weights::All(weight(*observed)), Weights::Places);
+                batch.vjp(v, g, *x, params, *n, weights);
                 true
             }
             Op::Score { dist, x, observed, out, last } => {

@@ -9,7 +9,7 @@ use crate::lang::builtins::Scalar;
 use crate::lang::code::{Code, DistSpec, Op, Operand, Slot};
 use crate::lang::index::index_value;
 use crate::lang::local_density::{
-    Instruction, KeptAlternative, LocalDensity, PARAMETERS, REGISTERS, Source,
+    Input, Instruction, KeptAlternative, LocalDensity, PARAMETERS, REGISTERS,
 };
 use crate::lang::value::{Extent, Value};
 use crate::trace::eval::Score;
@@ -178,7 +178,7 @@ impl Store {
         let mut e = Evaluation::new(self, &self.code, []);
         e.base = n - self.slot_facts(n).slot;
         for (to, o) in read.iter_mut().zip(args) {
-            *to = e.read(Source::Operand(*o))?;
+            *to = e.read(Input::Operand(*o))?;
         }
         family(self.code.builtins.get(*builtin), read)
     }
@@ -259,7 +259,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
                 }
                 Instruction::Compute { slot, first, count, into } => {
                     let from = first as usize;
-                    let operands = &local_density.sources[from..from + count as usize];
+                    let operands = &local_density.inputs[from..from + count as usize];
                     self.compute(slot, operands, into)?;
                 }
                 Instruction::Branch { slot, cond, otherwise } => {
@@ -325,7 +325,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
     }
 
     /// Runs the operation in a slot on these operands, as an update would.
-    fn compute(&mut self, slot: Slot, operands: &[Source], into: u8) -> Option<()> {
+    fn compute(&mut self, slot: Slot, operands: &[Input], into: u8) -> Option<()> {
         // Containers that it reads are held by its node.
         if self.node(slot).side.is_some() {
             return None;
@@ -369,7 +369,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
     }
 
     /// Scores an observation of any kind, as an update would.
-    fn observe(&mut self, slot: Slot, parameters: &[Source], observed: Source) -> Option<()> {
+    fn observe(&mut self, slot: Slot, parameters: &[Input], observed: Input) -> Option<()> {
         let n = self.base + slot;
         let Op::Observe { dist, .. } = self.graph.op(n) else { return None };
         let values = self.values(parameters)?;
@@ -416,7 +416,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
     fn log_density(
         &self,
         builtin: u32,
-        parameters: &[Source; PARAMETERS],
+        parameters: &[Input; PARAMETERS],
         x: Register,
     ) -> Option<f64> {
         let builtin = self.code.builtins.get(builtin);
@@ -481,27 +481,27 @@ impl<'a, const N: usize> Evaluation<'a, N> {
     }
 
     #[inline(always)]
-    fn read(&self, s: Source) -> Option<Register<'a>> {
+    fn read(&self, s: Input) -> Option<Register<'a>> {
         let node = match s {
-            Source::Register(r) => return Some(self.registers[r as usize]),
-            Source::Operand(Operand::Const(i)) => {
+            Input::Register(r) => return Some(self.registers[r as usize]),
+            Input::Operand(Operand::Const(i)) => {
                 return Some(Register::of(self.code.const_value(i)));
             }
-            Source::Operand(Operand::Local(slot)) => self.node(slot),
-            Source::Operand(o) => &self.graph[self.graph.resolve(self.frame(), o)?],
+            Input::Operand(Operand::Local(slot)) => self.node(slot),
+            Input::Operand(o) => &self.graph[self.graph.resolve(self.frame(), o)?],
         };
         (node.state == State::Clean).then(|| Register::of(&node.value))
     }
 
     #[inline(always)]
-    fn number(&self, s: Source) -> Option<f64> {
+    fn number(&self, s: Input) -> Option<f64> {
         match self.read(s)? {
             Register::Num(x) => Some(x),
             _ => None,
         }
     }
 
-    fn truth(&self, s: Source) -> Option<bool> {
+    fn truth(&self, s: Input) -> Option<bool> {
         match self.read(s)? {
             Register::Bool(b) => Some(b),
             _ => None,
@@ -518,14 +518,14 @@ impl<'a, const N: usize> Evaluation<'a, N> {
     }
 
     /// Returns a value as an operation reads it.
-    fn value(&self, s: Source) -> Option<Value> {
+    fn value(&self, s: Input) -> Option<Value> {
         match self.read(s)? {
             Register::Other(Value::Container(_)) => None,
             r => Some(self.to_value(r)),
         }
     }
 
-    fn values(&self, all: &[Source]) -> Option<SmallVec<[Value; 4]>> {
+    fn values(&self, all: &[Input]) -> Option<SmallVec<[Value; 4]>> {
         all.iter().map(|s| self.value(*s)).collect()
     }
 }

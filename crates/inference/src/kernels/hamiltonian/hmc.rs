@@ -23,11 +23,11 @@ pub(crate) const ROW: KernelRow = KernelRow::new(
 
 /// Hamiltonian Monte Carlo; with one step it is the Metropolis-adjusted Langevin
 /// algorithm.
-pub type Hmc = Hamiltonian<Leaps>;
+pub type Hmc = Hamiltonian<FixedSteps>;
 
 /// A fixed number of leapfrog steps, accepted or rejected as a whole.
 #[derive(Clone, Debug)]
-pub struct Leaps(u32);
+pub struct FixedSteps(u32);
 
 impl Hmc {
     /// A kernel for these choices with `steps` leapfrog steps. The step size is adapted
@@ -36,11 +36,11 @@ impl Hmc {
         // The optimal acceptance rates of Langevin steps and of long trajectories
         // (Roberts & Rosenthal 1998, Beskos et al. 2013).
         let target = if steps == 1 { 0.574 } else { 0.8 };
-        Hamiltonian::along(Leaps(steps.max(1)), scope, target, step)
+        Hamiltonian::along(FixedSteps(steps.max(1)), scope, target, step)
     }
 }
 
-impl Trajectory for Leaps {
+impl Trajectory for FixedSteps {
     fn name(&self) -> &'static str {
         if self.0 == 1 { "mala" } else { "hmc" }
     }

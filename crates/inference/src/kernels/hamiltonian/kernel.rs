@@ -167,12 +167,12 @@ impl<T: Trajectory + Send> Kernel for Hamiltonian<T> {
     }
 
     fn save(&self, trace: &Trace) -> Vec<u8> {
-        pack(&(&self.adaptation, self.memory.habits(trace)))
+        pack(&(&self.adaptation, self.memory.recording_state(trace)))
     }
 
     fn load(&mut self, state: &[u8]) -> Result<(), StateError> {
-        let (adaptation, habits) = unpack(state)?;
-        self.memory = Memory::with(habits);
+        let (adaptation, recording_state) = unpack(state)?;
+        self.memory = Memory::with(recording_state);
         self.adaptation.take_up(adaptation)
     }
 

@@ -71,7 +71,7 @@ enum Kept {
 /// The state of the recording policy. It is part of checkpoints because the last bits of
 /// gradients depend on it.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub(super) struct Habits {
+pub(super) struct RecordingState {
     runs: u32,
     wait: u32,
     waited: u32,
@@ -108,19 +108,19 @@ impl Clone for Memory {
 
 impl Memory {
     /// The state for a checkpoint.
-    pub fn habits(&self, trace: &Trace) -> Habits {
+    pub fn recording_state(&self, trace: &Trace) -> RecordingState {
         let kept = match &self.tape {
             None if self.kept == Kept::Present && !trace.is_new() => Kept::Past,
             None => self.kept,
             Some((tape, _)) if tape.holds(trace) => Kept::Present,
             Some(_) => Kept::Past,
         };
-        Habits { runs: self.runs, wait: self.wait, waited: self.waited, kept }
+        RecordingState { runs: self.runs, wait: self.wait, waited: self.waited, kept }
     }
 
     /// Restores the state of a checkpoint.
-    pub fn with(habits: Habits) -> Memory {
-        let Habits { runs, wait, waited, kept } = habits;
+    pub fn with(recording_state: RecordingState) -> Memory {
+        let RecordingState { runs, wait, waited, kept } = recording_state;
         Memory { runs, wait, waited, kept, ..Memory::default() }
     }
 

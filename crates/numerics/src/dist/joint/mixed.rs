@@ -1,9 +1,9 @@
 //! Batches for one mixture whose weights and component parameters lie in a buffer, as in
 //! [`crate::dist::batch`].
 
-use crate::dist::batch::{Component, component};
+use crate::dist::batch::{Component, To, Weights, component};
 use crate::dist::{Batch, Categorical, Dist, Mixture};
-use crate::num::{Column, ExactSum};
+use crate::num::Column;
 use smallvec::SmallVec;
 
 /// A component's family and the columns of its parameters.
@@ -103,17 +103,21 @@ impl Mixed {
 impl Batch for Mixed {
     fn score(
         &mut self,
-        buffer: &[f64],
+        buffer: &mut [f64],
         x: Column,
         _params: &[Column],
         n: usize,
-        sum: &mut ExactSum,
+        mut to: To<'_>,
     ) -> bool {
         self.refresh(buffer)
             && (0..n).all(|i| {
-                let x = x.get(buffer, i);
-                sum.add(self.log_density(x));
-                !x.is_nan()
+                let at = x.get(buffer, i);
+                let score = self.log_density(at);
+                match &mut to {
+                    To::Sum(sum) => sum.add(score),
+                    To::Places(out) => buffer[*out + i] = score,
+                }
+                !at.is_nan()
             })
     }
 
@@ -128,40 +132,14 @@ impl Batch for Mixed {
         x: Column,
         _params: &[Column],
         n: usize,
-        weight: f64,
-    ) {
-        (0..n).for_each(|i| self.vjp_one(buffer, by, x, i, weight));
-    }
-
-    fn score_each(
-        &mut self,
-        buffer: &mut [f64],
-        x: Column,
-        _params: &[Column],
-        n: usize,
-        out: usize,
-    ) -> bool {
-        self.refresh(buffer)
-            && (0..n).all(|i| {
-                let at = x.get(buffer, i);
-                buffer[out + i] = self.log_density(at);
-                !at.is_nan()
-            })
-    }
-
-    fn vjp_each(
-        &self,
-        buffer: &[f64],
-        by: &mut [f64],
-        x: Column,
-        _params: &[Column],
-        n: usize,
-        out: usize,
+        weights: Weights,
     ) {
         for i in 0..n {
-            let weight = by[out + i];
-            if weight != 0.0 {
-                self.vjp_one(buffer, by, x, i, weight);
+            match weights {
+                Weights::All(weight) => self.vjp_one(buffer, by, x, i, weight),
+                // An infinite slope does not matter there.
+                Weights::Places(from) if by[from + i] == 0.0 => {}
+                Weights::Places(from) => self.vjp_one(buffer, by, x, i, by[from + i]),
             }
         }
     }

@@ -44,11 +44,11 @@ fn many_at_once_are_as_one_at_a_time() {
             };
             let mut b = batch(&dist, &columns).unwrap();
             for shift in [0.0, 0.05, 0.05, 0.1] {
-                let v = fill(shift);
+                let mut v = fill(shift);
                 let (mut sum, mut expected) = (ExactSum::default(), ExactSum::default());
-                assert!(b.score(&v, x, &columns, n, &mut sum));
+                assert!(b.score(&mut v, x, &columns, n, To::Sum(&mut sum)));
                 let mut by = vec![0.0; v.len()];
-                b.vjp(&v, &mut by, x, &columns, n, 2.0);
+                b.vjp(&v, &mut by, x, &columns, n, Weights::All(2.0));
                 let mut slopes = vec![0.0; v.len()];
                 for (i, s) in seen.iter().enumerate() {
                     let datum = if family.starts_with("flip") {
@@ -70,12 +70,13 @@ fn many_at_once_are_as_one_at_a_time() {
                 assert!(off < 1e-12, "{family} {shape}: {by:?}, one at a time {slopes:?}");
             }
             // Parameters outside the domain.
-            let v = fill(if family.ends_with("_logit") || family.ends_with("_log") {
+            let mut v = fill(if family.ends_with("_logit") || family.ends_with("_log") {
                 INF
             } else {
                 -9.0
             });
-            assert!(!b.score(&v, x, &columns, n, &mut ExactSum::default()), "{family}");
+            let to = To::Sum(&mut ExactSum::default());
+            assert!(!b.score(&mut v, x, &columns, n, to), "{family}");
         }
     }
 }
