@@ -163,11 +163,13 @@ impl Trace {
         }
         let nodes = self.observation_nodes();
         for (hash, value) in values {
-            self.graph.put_observed(*hash, value.clone());
+            let Graph { store, update, .. } = &mut self.graph;
+            let old = Arc::make_mut(&mut store.observed).insert(*hash, value.clone());
+            update.note(Entry::Observed(*hash, old));
             if let Some(n) = nodes.get(hash) {
-                self.graph.update.save(&mut self.graph.store, *n);
-                self.graph.store[*n].flags |= TARGET;
-                self.graph.update.invalidate_target(&mut self.graph.store, &self.code, *n);
+                update.save(store, *n);
+                store[*n].flags |= TARGET;
+                update.invalidate_target(store, &self.code, *n);
             }
         }
     }
@@ -195,13 +197,6 @@ impl Trace {
         self.commit();
         self.graph.store.observed = Arc::clone(&other.graph.store.observed);
         Ok(())
-    }
-}
-
-impl Graph {
-    fn put_observed(&mut self, hash: u64, value: Value) {
-        let old = Arc::make_mut(&mut self.store.observed).insert(hash, value);
-        self.update.note(Entry::Observed(hash, old));
     }
 }
 

@@ -2,7 +2,7 @@
 //! surrogates of observations. Choices drawn for a query are discarded afterwards.
 
 use super::graph::Graph;
-use super::node::{Arguments, Deps, Frame, FrameId, State};
+use super::node::{Arguments, Frame, FrameId, State};
 use super::{Address, Draws, Trace, TraceResult};
 use crate::lang::code::{BlockId, Code, Operand};
 use crate::lang::value::Value;
@@ -121,28 +121,5 @@ impl Trace {
         let result = self.graph.surrogate_score(&self.code, n);
         self.graph.rollback(before);
         result
-    }
-}
-
-impl Graph {
-    pub(super) fn query(
-        &mut self,
-        code: &Code,
-        frame: FrameId,
-        operands: &[Operand],
-    ) -> TraceResult<Vec<Value>> {
-        let mut values = Vec::with_capacity(operands.len());
-        for o in operands {
-            if let Some(n) = self.resolve(frame, *o) {
-                self.evaluate(code, n)?;
-            }
-            if let Value::Container(r) = self.value(frame, *o) {
-                let gather = r.node.gather();
-                self.evaluate(code, gather)?;
-            }
-            let mut deps = Deps::new();
-            values.push(self.plain(frame, *o, &mut deps).clone());
-        }
-        Ok(values)
     }
 }

@@ -259,7 +259,7 @@ impl Store {
         }
     }
 
-    /// Undoes [`Graph::put_observed`].
+    /// Undoes the replacement of an observed value.
     pub(super) fn undo_observed(&mut self, hash: u64, old: Option<Value>) {
         let all = Arc::make_mut(&mut self.observed);
         match old {

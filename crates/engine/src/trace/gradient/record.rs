@@ -8,48 +8,45 @@
 
 use super::in_place::{Besides, Given, InPlace};
 use super::{Inputs, Reverse};
-use crate::lang::code::{Callee, Code, DistSpec, Op, Operand};
+use crate::lang::code::{Callee, DistSpec, Op, Operand};
 use crate::lang::tape::{Builder, Form, Scored, Tape};
 use crate::lang::value::Value;
+use crate::trace::Trace;
 use crate::trace::choices::Target;
-use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
 use pcadlang_numerics::dist::Dist;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::sync::Arc;
 
-impl Graph {
+impl Trace {
     /// Returns the nodes that an update of these choices may run.
-    fn reached(&mut self, code: &Code, targets: &[Target]) -> Vec<NodeId> {
-        let before = self.begin();
+    fn reached(&mut self, targets: &[Target]) -> Vec<NodeId> {
+        let g = &mut self.graph;
+        let before = g.begin();
         for (i, t) in targets.iter().enumerate() {
             // Elements of one choice are adjacent.
             if i == 0 || targets[i - 1].node != t.node {
-                self.update.invalidate_target(&mut self.store, code, t.node);
+                g.update.invalidate_target(&mut g.store, &self.code, t.node);
             }
         }
-        let mut all: Vec<NodeId> = self
+        let mut all: Vec<NodeId> = g
             .update
             .journal()
             .iter()
             .filter_map(|e| if let Entry::Node { id, .. } = e { Some(*id) } else { None })
             .collect();
-        self.rollback(before);
-        self.sort_by_place(&mut all);
+        g.rollback(before);
+        g.sort_by_place(&mut all);
         all
     }
 
     /// Records the log density as a function of the unconstrained coordinates of the
     /// targets, one after the other; `None` if it is not a straight-line program. With it
     /// comes how the trace can be moved in place, if it can.
-    pub(super) fn record(
-        &mut self,
-        code: &Code,
-        targets: &[Target],
-    ) -> Option<(Tape, Option<InPlace>)> {
-        let reached = self.reached(code, targets);
-        let mut r = self.recorder(&reached, Recorded::new(self.incremental), true);
+    pub(super) fn record_tape(&mut self, targets: &[Target]) -> Option<(Tape, Option<InPlace>)> {
+        let reached = self.reached(targets);
+        let mut r = self.recorder(&reached, Recorded::new(self.graph.incremental), true);
         for t in targets {
             r.place(*t)?;
         }
@@ -68,13 +65,12 @@ impl Graph {
     /// that are summed out a node has its value; `None` if it exists for some only.
     pub(in crate::trace) fn record_scores(
         &mut self,
-        code: &Code,
         targets: &[Target],
         recorded: Recorded,
         given: &FxHashMap<NodeId, Option<Given>>,
         work: impl FnOnce(&mut Recorder) -> Option<()>,
     ) -> Option<Recorded> {
-        let reached = self.reached(code, targets);
+        let reached = self.reached(targets);
         let mut r = self.recorder(&reached, recorded, false);
         if r.recorded.placed.is_empty() {
             for t in targets {
@@ -102,7 +98,7 @@ impl Graph {
         scores: bool,
     ) -> Recorder<'a> {
         let view = Reverse {
-            graph: self,
+            graph: &self.graph.store,
             marks: Vec::new(),
             order: Vec::new(),
             adjoints: FxHashMap::default(),

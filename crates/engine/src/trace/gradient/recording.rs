@@ -59,7 +59,7 @@ impl Trace {
     /// before it is evaluated.
     pub fn record(&mut self, targets: &[Target]) -> Option<Recording> {
         self.rollback();
-        let recorded = self.graph.record(&self.code, targets)?;
+        let recorded = self.record_tape(targets)?;
         Some(Recording::new(self, recorded, targets, SummedChoices::default()))
     }
 }

@@ -63,7 +63,6 @@ impl Reverse<'_> {
                 self.give_matrix(n, spec, &dist, &stored, &[], self.weight)?;
             }
             Op::Observe { dist: spec, value, .. } => {
-                let mut deps = Deps::new();
                 let observed = g.observed_value(n);
                 if let DistSpec::Value(o) = spec
                     && let Value::Likelihood(l) = g.value(frame, *o)

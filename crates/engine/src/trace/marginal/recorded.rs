@@ -147,7 +147,7 @@ impl Trace {
             }
         }
         let (first, table) = (record.first, &mut *record.table);
-        self.graph.record_scores(&self.code, targets, before, record.given, |r: &mut Recorder| {
+        self.record_scores(targets, before, record.given, |r: &mut Recorder| {
             if first {
                 for n in base {
                     r.score(n)?;

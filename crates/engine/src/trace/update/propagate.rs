@@ -6,7 +6,7 @@
 //! changed.
 
 use crate::lang::builtins::PreviousEvaluation;
-use crate::lang::code::{Code, Op};
+use crate::lang::code::{Code, Op, Operand};
 use crate::lang::error::{FaultKind, RunError};
 use crate::lang::value::Value;
 use crate::trace::graph::Graph;
@@ -315,5 +315,26 @@ impl Graph {
             log.push((f.block, n - f.base));
         }
         Ok(step)
+    }
+
+    /// Evaluates operands of a frame, with containers read as arrays or records.
+    pub fn query(
+        &mut self,
+        code: &Code,
+        frame: FrameId,
+        operands: &[Operand],
+    ) -> Result<Vec<Value>, Failure> {
+        let mut values = Vec::with_capacity(operands.len());
+        for o in operands {
+            if let Some(n) = self.resolve(frame, *o) {
+                self.evaluate(code, n)?;
+            }
+            if let Value::Container(r) = self.value(frame, *o) {
+                let gather = r.node.gather();
+                self.evaluate(code, gather)?;
+            }
+            values.push(self.plain(frame, *o, &mut Deps::new()).clone());
+        }
+        Ok(values)
     }
 }
