@@ -76,7 +76,7 @@ pub enum Instruction {
 pub struct KeptAlternative {
     /// The selection.
     pub selection: Slot,
-    /// Whether it is the first alternative.
+    /// True if it is the first alternative.
     pub first: bool,
     /// The operand that is held.
     pub operand: Operand,
@@ -93,7 +93,7 @@ pub struct LocalDensity {
     pub inputs: Box<[Input]>,
     /// The computations that depend on the value; other blocks must not read them.
     pub computations: Box<[Slot]>,
-    /// What the alternatives of its selections hold. When a selection switches, it must
+    /// The operands that alternatives of its selections hold. When a selection switches, it must
     /// be kept by other holders.
     pub held: Box<[KeptAlternative]>,
     /// The computations of the alternatives; they must hold nothing besides their
@@ -154,7 +154,7 @@ struct Compiler<'a> {
     /// By slot: the register that contains its value whenever the next instruction runs.
     known: Vec<Option<u8>>,
     registers: usize,
-    /// Whether the next instruction is inside an alternative, so that what it reads may
+    /// True if the next instruction is inside an alternative, so that what it reads may
     /// not be evaluated.
     inside: bool,
     held: Vec<KeptAlternative>,
@@ -298,7 +298,7 @@ impl Compiler<'_> {
         }
     }
 
-    /// Whether a built-in is a function of single numbers.
+    /// True if a built-in is a function of single numbers.
     fn is_on_numbers(&self, builtin: u32) -> bool {
         let scalar = &self.builtins.get(builtin).scalar;
         matches!(

@@ -77,7 +77,7 @@ impl Trace {
         own
     }
 
-    /// Whether the pending proposal removes a choice at one of these addresses, even if
+    /// True if the pending proposal removes a choice at one of these addresses, even if
     /// another one replaces it.
     pub fn takes_away(&self, addresses: &[u64]) -> bool {
         self.graph.update.removed.iter().any(|(_, hash, _)| addresses.contains(hash))

@@ -47,7 +47,7 @@ impl Requested {
         }
     }
 
-    /// Whether each of these is needed, under some assignment, by a score or by a choice
+    /// True if each of these is needed, under some assignment, by a score or by a choice
     /// that is needed.
     fn has_all(&self, choices: &[Target]) -> bool {
         let mut all = self.by_scores.clone();
@@ -275,7 +275,7 @@ impl Trace {
         }
     }
 
-    /// Whether the pending update detaches a frame that contains a held choice, or a loop
+    /// True if the pending update detaches a frame that contains a held choice, or a loop
     /// around one.
     pub(super) fn detaches_held(&self) -> bool {
         let g = &self.graph;

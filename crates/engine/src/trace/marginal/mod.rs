@@ -54,10 +54,10 @@ pub struct Elimination {
     /// it.
     reached: FxHashMap<NodeId, usize>,
     owners: FxHashMap<NodeId, usize>,
-    /// Whether this is valid at a single point only, because what is read depends on
+    /// True if this is valid at a single point only, because what is read depends on
     /// choices that the kernel moves.
     pub structure_moves: bool,
-    /// Whether the distributions of the choices depend on choices that the kernel moves.
+    /// True if the distributions of the choices depend on choices that the kernel moves.
     values_move: bool,
 }
 
@@ -107,7 +107,7 @@ impl Elimination {
 }
 
 impl Trace {
-    /// Whether what is read, and thus which choices exist, depends on choices of a kind,
+    /// True if what is read, and thus which choices exist, depends on choices of a kind,
     /// as far as the current state shows.
     pub fn structure_depends_on(&self, kind: ChoiceKind) -> bool {
         let selector = Selector::Kind(kind);
@@ -132,7 +132,7 @@ impl Trace {
         around.filter_map(|n| elimination.owners.get(&n).copied()).last()
     }
 
-    /// Whether the choices have the same supports in the current state (including a
+    /// True if the choices have the same supports in the current state (including a
     /// pending proposal) as at the start of the step.
     pub fn has_same_values(&self, m: &Marginal) -> bool {
         !m.elimination.values_move || self.moved_support(m).is_none()

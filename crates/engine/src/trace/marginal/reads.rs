@@ -22,7 +22,7 @@ pub(super) struct Label {
     /// One of the summed-out choices, which represents its group; [`NONE`] if there is
     /// none.
     pub site: u32,
-    /// Whether it depends on a choice that the kernel moves.
+    /// True if it depends on a choice that the kernel moves.
     pub moves: bool,
     /// All of the summed-out choices, if [`Sets`] are kept.
     pub set: u32,
@@ -35,7 +35,7 @@ const NOTHING: Label = Label { site: NONE, moves: false, set: 0 };
 pub(super) struct Sets {
     all: Vec<SmallVec<[u32; 4]>>,
     unions: FxHashMap<(u32, u32), u32>,
-    /// Whether a set has become too large.
+    /// True if a set has become too large.
     pub overflow: bool,
 }
 
@@ -93,7 +93,7 @@ enum Visit {
     Done,
 }
 
-/// What was found in one state.
+/// The findings in one state.
 #[derive(Debug, Default)]
 pub(super) struct Found {
     /// Scores that depend on a choice: the node, and one choice of the group.
@@ -107,17 +107,17 @@ pub(super) struct Found {
     pub factors: Vec<(NodeId, u32)>,
     /// The choices that observations and factors depend on.
     pub asked: Vec<NodeId>,
-    /// Whether what is read depends on choices that the kernel moves.
+    /// True if what is read depends on choices that the kernel moves.
     pub structure_moves: bool,
-    /// Whether what is read, or which nodes exist, depends on choices that are summed out.
+    /// True if what is read, or which nodes exist, depends on choices that are summed out.
     pub structure_varies: bool,
-    /// Whether the distributions of choices that are summed out depend on choices that
+    /// True if the distributions of choices that are summed out depend on choices that
     /// the kernel moves.
     pub values_move: bool,
-    /// Whether observations are made in a `mem` function: any choice may decide whether
+    /// True if observations are made in a `mem` function: any choice may decide whether
     /// they exist.
     pub anywhere: bool,
-    /// Whether the existence of observations depends on choices in a way that is not
+    /// True if the existence of observations depends on choices in a way that is not
     /// tracked.
     pub unclear: bool,
 }

@@ -28,7 +28,7 @@ pub(super) struct Sites {
     colours: Vec<usize>,
     /// By factor: the choices that it depends on, in ascending order.
     pub scopes: BTreeMap<NodeId, Vec<usize>>,
-    /// Whether what is read is known to be the same in all states.
+    /// True if what is read is known to be the same in all states.
     same: bool,
 }
 
@@ -45,7 +45,7 @@ pub(super) enum Halt {
 
 /// A state that is being visited.
 pub(super) struct Visited<'a> {
-    /// Whether it is the first one.
+    /// True if it is the first one.
     pub first: bool,
     /// The index of each choice's value.
     pub indices: &'a [usize],

@@ -24,7 +24,7 @@ const MOST_WORK: usize = 1 << 24;
 pub struct Tabulated {
     /// The hashes of the addresses of the choices, and the values of each.
     choices: Vec<(u64, Vec<Datum>)>,
-    /// What depends on the choices, which are numbered from 0.
+    /// The scores that depend on the choices, which are numbered from 0.
     pub factors: Vec<Factor>,
     /// The log density of what depends on none of them.
     pub rest: f64,

@@ -49,7 +49,7 @@ pub(crate) struct Evaluation<'a, const N: usize> {
     registers: [Register<'a>; N],
     /// The values that are neither numbers nor part of the trace.
     made: SmallVec<[Value; 4]>,
-    /// Whether a selection takes its other alternative.
+    /// True if a selection takes its other alternative.
     turned: bool,
     prior: ExactSum,
     likelihood: ExactSum,
@@ -156,7 +156,7 @@ impl Graph {
 }
 
 impl Store {
-    /// Whether a choice is a single number or boolean, stored as the program sees it.
+    /// True if a choice is a single number or boolean, stored as the program sees it.
     pub fn is_plain_choice(&self, n: NodeId) -> bool {
         let node = &self[n];
         let whole = match node.side.as_deref() {
@@ -387,7 +387,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
         Some(())
     }
 
-    /// Whether its selections can take their other alternatives without releasing
+    /// True if its selections can take their other alternatives without releasing
     /// anything except computations.
     fn can_choose(&self, local_density: &LocalDensity) -> bool {
         let is_taken = |h: &KeptAlternative| {

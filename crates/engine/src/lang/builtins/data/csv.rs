@@ -15,7 +15,8 @@ use std::sync::Arc;
 /// A row and its first byte.
 type Row = (usize, StringRecord);
 
-/// The spellings of a missing entry in spreadsheets, R, pandas and other programs, in small letters.
+/// The spellings of a missing entry in spreadsheets, R, pandas and other programs, in small
+/// letters.
 const ABSENT: [&str; 12] =
     ["", "na", "n/a", "#n/a", "#na", "<na>", "null", "none", "nan", "-", ".", "?"];
 /// A column holds numbers if there are at least this many of them for each other text: the
