@@ -54,10 +54,7 @@ impl Trace {
         let mut whole = address.clone();
         let key = whole.segments.last_mut()?.keys.pop()?;
         let n = self.graph.choices.find(whole.hash64())?;
-        let elements = match self.graph.store[n].side.as_deref() {
-            Some(node::Side::Choice(c)) if c.elements != NONE => c.elements,
-            _ => return None,
-        };
+        let elements = self.graph.choice_of(n).map(|c| c.elements).filter(|e| *e != NONE)?;
         let element = key.as_index().filter(|i| *i < elements as usize)?;
         Some(Target { node: n, element: element as u32 })
     }
@@ -137,12 +134,8 @@ impl Trace {
     /// Returns the number of elements, if a choice is an array of separately addressed
     /// elements.
     pub fn elements(&self, t: Target) -> Option<usize> {
-        match self.graph.store[t.node].side.as_deref() {
-            Some(node::Side::Choice(c)) if c.elements != NONE && t.element == NONE => {
-                Some(c.elements as usize)
-            }
-            _ => None,
-        }
+        let elements = self.graph.choice_of(t.node)?.elements;
+        (elements != NONE && t.element == NONE).then_some(elements as usize)
     }
 
     /// Returns the number of active choices, counting elements separately.

@@ -407,6 +407,16 @@ impl Store {
             && self.code.blocks[f.block].result == Some(Operand::Local(result - f.base))
     }
 
+    /// Returns the loop that a node runs.
+    pub fn loop_of(&self, n: NodeId) -> Option<&Loop> {
+        if let Some(Side::Loop(l)) = self[n].side.as_deref() { Some(l) } else { None }
+    }
+
+    /// Returns what a choice keeps besides its value.
+    pub fn choice_of(&self, n: NodeId) -> Option<&ChoiceSide> {
+        if let Some(Side::Choice(c)) = self[n].side.as_deref() { Some(c) } else { None }
+    }
+
     /// Returns the users of a node in other frames, and how many of them have released it.
     pub fn outside(&self, n: NodeId) -> &Outside {
         &self.outside[self[n].outside as usize]

@@ -99,10 +99,7 @@ impl Store {
 
     /// Returns the address hash of a keyed choice.
     pub fn own_hash(&self, n: NodeId) -> Option<u64> {
-        match self[n].side.as_deref() {
-            Some(Side::Choice(c)) => c.hash,
-            _ => None,
-        }
+        self.choice_of(n)?.hash
     }
 
     /// Returns the distribution of a draw or observation whose parameters are evaluated.
@@ -152,36 +149,27 @@ impl Store {
 
     /// Returns the hash of a choice's address.
     pub(crate) fn choice_hash(&self, n: NodeId) -> u64 {
-        if let Some(Side::Choice(c)) = self[n].side.as_deref()
-            && let Some(h) = c.hash
-        {
-            return h;
-        }
-        match self.op(n) {
-            Op::Draw { site, .. } => self.site_hash(self[n].frame, *site),
+        match (self.own_hash(n), self.op(n)) {
+            (Some(hash), _) => hash,
+            (None, Op::Draw { site, .. }) => self.site_hash(self[n].frame, *site),
             _ => 0,
         }
     }
 
     /// Returns the stored form of a choice.
     pub(crate) fn stored(&self, n: NodeId) -> Option<Datum> {
-        match self[n].side.as_deref() {
-            Some(Side::Choice(ChoiceSide { stored: Some(s), .. })) => Some(s.clone()),
-            _ => self[n].value.to_datum(),
-        }
+        let stored = self.choice_of(n).and_then(|c| c.stored.clone());
+        stored.or_else(|| self[n].value.to_datum())
     }
 
     /// Returns the stored form of a choice as a value of the language.
     pub(crate) fn stored_value(&self, n: NodeId) -> Value {
-        let node = &self[n];
-        match node.side.as_deref() {
-            Some(Side::Choice(ChoiceSide { stored: Some(s), .. })) => Value::from_datum(s),
-            _ => node.value.clone(),
-        }
+        let stored = self.choice_of(n).and_then(|c| c.stored.as_ref());
+        stored.map_or_else(|| self[n].value.clone(), Value::from_datum)
     }
 
     pub(crate) fn is_whitened(&self, n: NodeId) -> bool {
-        matches!(self[n].side.as_deref(), Some(Side::Choice(ChoiceSide { stored: Some(_), .. })))
+        self.choice_of(n).is_some_and(|c| c.stored.is_some())
     }
 
     /// Scores an observation, or returns the node to wait for.

@@ -15,7 +15,7 @@ pub use entry::Entry;
 pub use pcadlang_engine::lang::adjoint::Adjoint;
 #[doc(inline)]
 pub use pcadlang_engine::lang::builtins::data::{
-    DataFormat, Literal, Options as DataOptions, SiblingFiles,
+    DataFormat, Literal, Options as DataOptions, Siblings,
 };
 #[doc(inline)]
 pub use pcadlang_engine::lang::builtins::{Args, Defaults, InputHook, Type};

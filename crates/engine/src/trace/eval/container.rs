@@ -96,10 +96,7 @@ impl Graph {
                 return self.need(node).map(Some);
             }
             deps.push(node);
-            let count = match self.store[node].side.as_deref() {
-                Some(Side::Loop(l)) => l.frames.len(),
-                _ => 0,
-            };
+            let count = self.loop_of(node).map_or(0, |l| l.frames.len());
             for i in 0..count {
                 let inner = self.pass_frame(node, i)?;
                 passes.push(i as u32);
@@ -163,10 +160,7 @@ impl Graph {
                 let ([key], source) = (keys, &sources[0]) else { return Ok(Found::Missing) };
                 let outer = self.store[self.store[container].frame].base + source.loops[0];
                 let draw = source.draw;
-                let pass = match self.store[outer].side.as_deref() {
-                    Some(Side::Loop(l)) => l.keys.find(key),
-                    _ => None,
-                };
+                let pass = self.loop_of(outer).and_then(|l| l.keys.find(key));
                 let Some(pass) = pass else { return Ok(Found::Missing) };
                 let f = self.pass_frame(outer, pass)?;
                 Ok(Found::Place(Place::Node(self.store[f].base + draw)))

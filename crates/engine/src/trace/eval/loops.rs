@@ -20,10 +20,7 @@ impl Graph {
         if self.store[owner].state == State::Stale {
             return self.need(owner);
         }
-        let value = match self.store[owner].side.as_deref() {
-            Some(Side::Loop(l)) => l.items.element(pass).unwrap_or_default(),
-            _ => Value::Unit,
-        };
+        let value = self.loop_of(owner).and_then(|l| l.items.element(pass)).unwrap_or_default();
         Ok(self.finish(n, value))
     }
 
@@ -85,10 +82,7 @@ impl Graph {
 
     pub(super) fn evaluate_map(&mut self, n: NodeId, f: Operand, over: Operand) -> Step {
         let frame = self.store[n].frame;
-        if let Some(step) = self.await_all(frame, &[f])? {
-            return Ok(step);
-        }
-        if let Some(step) = self.await_plain(frame, &[over])? {
+        if let Some(step) = self.await_plain(frame, &[f, over])? {
             return Ok(step);
         }
         let mut deps = Deps::new();
@@ -141,10 +135,7 @@ impl Graph {
         over: Operand,
     ) -> Step {
         let frame = self.store[n].frame;
-        if let Some(step) = self.await_all(frame, &[f])? {
-            return Ok(step);
-        }
-        if let Some(step) = self.await_plain(frame, &[over])? {
+        if let Some(step) = self.await_plain(frame, &[f, over])? {
             return Ok(step);
         }
         let mut deps = Deps::new();
@@ -162,10 +153,7 @@ impl Graph {
         };
         self.check_callback(n, "fold", block, 2)?;
         self.set_loop(n, keys, items, block, parent, deps)?;
-        let passes = match self.store[n].side.as_deref() {
-            Some(Side::Loop(l)) => l.frames.len(),
-            _ => 0,
-        };
+        let passes = self.loop_of(n).map_or(0, |l| l.frames.len());
         let Some(last) = passes.checked_sub(1) else {
             return self.take_operand(n, frame, init);
         };
@@ -268,10 +256,7 @@ impl Graph {
     }
 
     fn make_all_passes(&mut self, n: NodeId) -> Result<(), Failure> {
-        let passes = match self.store[n].side.as_deref() {
-            Some(Side::Loop(l)) => l.frames.len(),
-            _ => 0,
-        };
+        let passes = self.loop_of(n).map_or(0, |l| l.frames.len());
         for i in 0..passes {
             self.pass_frame(n, i)?;
         }

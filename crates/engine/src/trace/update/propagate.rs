@@ -166,14 +166,12 @@ impl Graph {
                     }
                 }
             }
-            match self.budget.count_operation(&self.store, n).and_then(|()| self.step(code, n)) {
-                Ok(Poll::Ready) => {}
-                Ok(Poll::Pending) => {}
-                Err(e) => {
-                    self.update.failed.clear();
-                    self.update.failed.extend(self.update.stack.drain(bottom..));
-                    return Err(e);
-                }
+            let step =
+                self.budget.count_operation(&self.store, n).and_then(|()| self.step(code, n));
+            if let Err(e) = step {
+                self.update.failed.clear();
+                self.update.failed.extend(self.update.stack.drain(bottom..));
+                return Err(e);
             }
         }
         Ok(())

@@ -1,6 +1,6 @@
 //! Armatures: a rig file and what it names, or a glTF file with a skin.
 
-use super::SiblingFiles;
+use super::Siblings;
 use crate::scene::ArmatureValue;
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::geom::armature::{Armature, morphs_from_json, rig_from_json};
@@ -13,7 +13,7 @@ pub(super) fn load(
     file: &str,
     bytes: &[u8],
     frame: &FileFrame,
-    beside: &SiblingFiles,
+    beside: &Siblings,
 ) -> Result<Value, String> {
     let plain = |e: GeomError| e.to_string();
     if gltf::is_gltf(file, bytes) {

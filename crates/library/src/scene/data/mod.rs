@@ -6,7 +6,7 @@ mod options;
 
 use super::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue, SolidValue};
 use pcadlang_engine::lang::builtins::data::{
-    DataFormat, FILE, Literal, Options, SiblingFiles, kind, unreadable,
+    DataFormat, FILE, Literal, Options, Siblings, kind, unreadable,
 };
 use pcadlang_engine::lang::builtins::{Arg, Row, Type, arg, opt};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
@@ -136,13 +136,7 @@ pub(super) const TABLE: &[Row] = &[
 struct Plain(fn(&[u8], &Limits) -> Result<Value, VisionError>);
 
 impl DataFormat for Plain {
-    fn load(
-        &self,
-        file: &str,
-        bytes: &[u8],
-        _: &Options,
-        _: &SiblingFiles,
-    ) -> Result<Value, Fault> {
+    fn load(&self, file: &str, bytes: &[u8], _: &Options, _: &Siblings) -> Result<Value, Fault> {
         (self.0)(bytes, &Limits::default()).map_err(|e| unreadable(file, &e.to_string()))
     }
 }
@@ -176,7 +170,7 @@ impl DataFormat for DetectorFile {
         file: &str,
         bytes: &[u8],
         options: &Options,
-        _: &SiblingFiles,
+        _: &Siblings,
     ) -> Result<Value, Fault> {
         let network = options::network(options).map_err(|why| unreadable(file, &why))?;
         FileDetector::read(bytes, &network)
@@ -200,7 +194,7 @@ impl DataFormat for DetectorFile {
 /// A mesh or an armature, in a frame of its own.
 #[derive(Debug)]
 struct Shape {
-    load: fn(&str, &[u8], &FileFrame, &SiblingFiles) -> Result<Value, String>,
+    load: fn(&str, &[u8], &FileFrame, &Siblings) -> Result<Value, String>,
     example: &'static str,
 }
 
@@ -210,7 +204,7 @@ impl DataFormat for Shape {
         file: &str,
         bytes: &[u8],
         options: &Options,
-        beside: &SiblingFiles,
+        beside: &Siblings,
     ) -> Result<Value, Fault> {
         options::frame(options)
             .and_then(|frame| (self.load)(file, bytes, &frame, beside))
@@ -226,12 +220,7 @@ impl DataFormat for Shape {
     }
 }
 
-fn mesh(
-    file: &str,
-    bytes: &[u8],
-    frame: &FileFrame,
-    beside: &SiblingFiles,
-) -> Result<Value, String> {
+fn mesh(file: &str, bytes: &[u8], frame: &FileFrame, beside: &Siblings) -> Result<Value, String> {
     let mesh = match gltf::is_gltf(file, bytes) {
         true => gltf::load(bytes, frame, beside).and_then(gltf::Loaded::mesh),
         false => obj::load_in(bytes, frame),
@@ -244,13 +233,7 @@ fn mesh(
 struct KeypointsFile;
 
 impl DataFormat for KeypointsFile {
-    fn load(
-        &self,
-        file: &str,
-        bytes: &[u8],
-        _: &Options,
-        _: &SiblingFiles,
-    ) -> Result<Value, Fault> {
+    fn load(&self, file: &str, bytes: &[u8], _: &Options, _: &Siblings) -> Result<Value, Fault> {
         load_keypoints(file, bytes, None)
     }
 

@@ -11,7 +11,7 @@ use std::fmt;
 use std::sync::Arc;
 
 /// Reads a file by its path relative to that of another, or says why it cannot.
-pub type SiblingFiles<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
+pub type Siblings<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
 
 /// How the files of a kind of data are read; the kind's name, options and documentation are
 /// its row in the table of built-ins.
@@ -26,7 +26,7 @@ pub trait DataFormat: fmt::Debug + Send + Sync {
         file: &str,
         bytes: &[u8],
         options: &Options,
-        beside: &SiblingFiles,
+        beside: &Siblings,
     ) -> Result<Value, Fault>;
 
     /// The value of a `data` item that is given no file, if this kind can do without.

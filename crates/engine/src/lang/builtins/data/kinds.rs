@@ -1,6 +1,6 @@
 //! The kinds of data that a table has.
 
-use super::format::{Literal, Options, SiblingFiles};
+use super::format::{Literal, Options, Siblings};
 use crate::lang::builtins::{Builtin, Table};
 use crate::lang::fault::Fault;
 use crate::lang::value::Value;
@@ -36,7 +36,7 @@ impl Table {
         file: &str,
         bytes: &[u8],
         options: &Options,
-        beside: &SiblingFiles,
+        beside: &Siblings,
     ) -> Result<Value, Fault> {
         match self.kind(kind).and_then(|b| b.format.as_ref()) {
             Some(format) => format.load(file, bytes, options, beside),

@@ -10,7 +10,7 @@ mod format;
 mod json;
 mod kinds;
 
-pub use format::{DataFormat, Literal, Options, SiblingFiles};
+pub use format::{DataFormat, Literal, Options, Siblings};
 
 use super::{Arg, Args, Row, Type, arg, function};
 use crate::lang::error::{Fault, FaultKind};
@@ -52,13 +52,7 @@ pub(super) const TABLE: &[Row] = &[
 struct Text(fn(&[u8], &str) -> Result<Value, String>);
 
 impl DataFormat for Text {
-    fn load(
-        &self,
-        file: &str,
-        bytes: &[u8],
-        _: &Options,
-        _: &SiblingFiles,
-    ) -> Result<Value, Fault> {
+    fn load(&self, file: &str, bytes: &[u8], _: &Options, _: &Siblings) -> Result<Value, Fault> {
         (self.0)(bytes, file).map_err(|why| unreadable(file, &why))
     }
 }
