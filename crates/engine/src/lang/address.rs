@@ -46,7 +46,7 @@ impl Address {
         })
     }
 
-    /// Whether this address is `other` or below it: the same segments, with the same
+    /// True if this address is `other` or below it: the same segments, with the same
     /// leading keys at the last of them.
     pub fn starts_with(&self, other: &Address) -> bool {
         let Some((last, init)) = other.segments.split_last() else { return true };
@@ -102,7 +102,7 @@ impl fmt::Display for AddressSegment {
     }
 }
 
-/// Whether a name is one given to unnamed observations or factors, which always show
+/// True if a name is one given to unnamed observations or factors, which always show
 /// their number.
 pub(crate) fn is_numbered(name: &str) -> bool {
     name == "obs" || name == "factor"
@@ -119,7 +119,7 @@ pub struct AddressTextError {
     pub text: String,
     /// The byte offset at which reading stopped.
     pub at: usize,
-    /// What was expected there.
+    /// The expected text.
     pub expected: &'static str,
 }
 

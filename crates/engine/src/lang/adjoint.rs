@@ -25,12 +25,12 @@ pub enum Adjoint {
 }
 
 impl Adjoint {
-    /// Whether it is zero.
+    /// True if it is zero.
     pub fn is_zero(&self) -> bool {
         matches!(self, Adjoint::Zero)
     }
 
-    /// Whether any part of it is unknown.
+    /// True if any part of it is unknown.
     pub fn is_unknown(&self) -> bool {
         match self {
             Adjoint::Unknown => true,

@@ -20,7 +20,7 @@ pub(crate) enum Score {
     Sum(ExactSum),
 }
 
-/// Whether it is flat everywhere. It then also accepts values that are not numbers: as a
+/// True if it is flat everywhere. It then also accepts values that are not numbers: as a
 /// surrogate, it ignores an observation.
 fn tells_nothing(dist: &Dist) -> bool {
     matches!(dist, Dist::Flat(f) if *f == Flat::EVERYWHERE)
@@ -119,7 +119,7 @@ pub(crate) fn pointwise(dist: &Dist, observed: &Value) -> Vec<f64> {
     }
 }
 
-/// Whether a value consists of several values of a distribution, each observed on its
+/// True if a value consists of several values of a distribution, each observed on its
 /// own.
 pub(crate) fn is_repeated(dist: &Dist, observed: &Value) -> bool {
     match observed {
@@ -129,7 +129,7 @@ pub(crate) fn is_repeated(dist: &Dist, observed: &Value) -> bool {
     }
 }
 
-/// Whether it is over a boolean; the numbers 1 and 0 of an array are then booleans too.
+/// True if it is over a boolean; the numbers 1 and 0 of an array are then booleans too.
 fn is_truth(dist: &Dist) -> bool {
     !dist.is_scalar() && dist.support() == Support::Boolean
 }

@@ -14,7 +14,7 @@ use std::sync::Arc;
 pub struct RunError {
     /// Its kind.
     pub kind: FaultKind,
-    /// What went wrong.
+    /// The error message.
     pub message: String,
     /// The expression or statement being executed.
     pub span: Span,
@@ -22,12 +22,12 @@ pub struct RunError {
     pub address: Address,
     /// The calls that lead there, outermost first: function and call site.
     pub calls: Vec<(Arc<str>, Span)>,
-    /// What to try.
+    /// A suggestion.
     pub hint: Option<String>,
 }
 
 impl RunError {
-    /// Whether a proposal that fails like this is rejected, rather than ending the run.
+    /// True if a proposal that fails like this is rejected, rather than ending the run.
     pub fn is_recoverable(&self) -> bool {
         self.kind == FaultKind::Domain
     }

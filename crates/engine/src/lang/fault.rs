@@ -33,9 +33,9 @@ pub enum FaultKind {
 pub struct Fault {
     /// Its kind.
     pub kind: FaultKind,
-    /// What went wrong.
+    /// The error message.
     pub message: String,
-    /// What to try.
+    /// A suggestion.
     pub hint: Option<String>,
 }
 

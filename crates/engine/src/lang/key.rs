@@ -107,7 +107,7 @@ pub fn hash_str(h: u64, s: &str) -> u64 {
     h
 }
 
-/// Whether a string can be written in an address without quotes and cannot be mistaken
+/// True if a string can be written in an address without quotes and cannot be mistaken
 /// for something else.
 pub(crate) fn is_bare(s: &str) -> bool {
     !s.is_empty()

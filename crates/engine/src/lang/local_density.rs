@@ -76,7 +76,7 @@ pub enum Instruction {
 pub struct KeptAlternative {
     /// The selection.
     pub selection: Slot,
-    /// Whether it is the first alternative.
+    /// True if it is the first alternative.
     pub first: bool,
     /// The operand that is held.
     pub operand: Operand,
@@ -93,7 +93,7 @@ pub struct LocalDensity {
     pub inputs: Box<[Input]>,
     /// The computations that depend on the value; other blocks must not read them.
     pub computations: Box<[Slot]>,
-    /// What the alternatives of its selections hold. When a selection switches, it must
+    /// The operands that alternatives of its selections hold. When a selection switches, it must
     /// be kept by other holders.
     pub held: Box<[KeptAlternative]>,
     /// The computations of the alternatives; they must hold nothing besides their
@@ -123,10 +123,9 @@ impl LocalDensity {
             held: Vec::new(),
             computed: Vec::new(),
         };
-        dependents.iter().for_each(|s| compiler.dependent[*s as usize] = true);
-        let is_score = |s: &Slot| {
-            matches!(ops[*s as usize], Op::Draw { .. } | Op::Observe { .. } | Op::Factor { .. })
-        };
+        dependents.iter().for_each(|s| compiler.dependent[*s] = true);
+        let is_score =
+            |s: &Slot| matches!(ops[*s], Op::Draw { .. } | Op::Observe { .. } | Op::Factor { .. });
         let (scores, computations): (Vec<Slot>, Vec<Slot>) =
             dependents.into_iter().partition(is_score);
         scores.into_iter().try_for_each(|slot| compiler.score(slot))?;
@@ -155,7 +154,7 @@ struct Compiler<'a> {
     /// By slot: the register that contains its value whenever the next instruction runs.
     known: Vec<Option<u8>>,
     registers: usize,
-    /// Whether the next instruction is inside an alternative, so that what it reads may
+    /// True if the next instruction is inside an alternative, so that what it reads may
     /// not be evaluated.
     inside: bool,
     held: Vec<KeptAlternative>,
@@ -167,7 +166,7 @@ impl Compiler<'_> {
     fn score(&mut self, slot: Slot) -> Option<()> {
         let known = self.known.clone();
         let skip = self.push(Instruction::SkipUnevaluated { slot, to: 0 })?;
-        let instruction = match &self.ops[slot as usize] {
+        let instruction = match &self.ops[slot] {
             Op::Draw { dist: DistSpec::Family { builtin, args }, keys, .. } => {
                 if keys.iter().any(|k| self.depends(*k)) {
                     return None;
@@ -204,7 +203,7 @@ impl Compiler<'_> {
     }
 
     fn depends(&self, o: Operand) -> bool {
-        matches!(o, Operand::Local(s) if s == self.from || self.dependent[s as usize])
+        matches!(o, Operand::Local(s) if s == self.from || self.dependent[s])
     }
 
     /// Returns where the value of an operand is.
@@ -213,12 +212,12 @@ impl Compiler<'_> {
         if slot == self.from {
             return Some(Input::Register(0));
         }
-        if let Some(r) = self.known[slot as usize] {
+        if let Some(r) = self.known[slot] {
             return Some(Input::Register(r));
         }
-        if self.dependent[slot as usize] {
+        if self.dependent[slot] {
             let r = self.compute(slot)?;
-            self.known[slot as usize] = Some(r);
+            self.known[slot] = Some(r);
             return Some(Input::Register(r));
         }
         if !self.inside || !self.is_computed(slot) {
@@ -231,12 +230,12 @@ impl Compiler<'_> {
         self.push(Instruction::Copy { from: Input::Register(r), into })?;
         self.known = known;
         self.land(recall);
-        self.known[slot as usize] = Some(into);
+        self.known[slot] = Some(into);
         Some(Input::Register(into))
     }
 
     fn is_computed(&self, slot: Slot) -> bool {
-        match &self.ops[slot as usize] {
+        match &self.ops[slot] {
             // A host's functions may be costly, or keep a state in the node.
             Op::Prim { builtin, .. } => self.builtins.get(*builtin).host.is_none(),
             Op::Index { .. } | Op::Select { .. } | Op::Array(_) | Op::Record { .. } => true,
@@ -246,7 +245,7 @@ impl Compiler<'_> {
 
     /// Emits the instructions that compute a slot; returns the register of its value.
     fn compute(&mut self, slot: Slot) -> Option<u8> {
-        match &self.ops[slot as usize] {
+        match &self.ops[slot] {
             Op::Prim { builtin, args } if self.is_on_numbers(*builtin) => {
                 let mut arg = |i: usize| self.input(*args.get(i)?);
                 let (x, y) = (arg(0)?, arg(1));
@@ -299,7 +298,7 @@ impl Compiler<'_> {
         }
     }
 
-    /// Whether a built-in is a function of single numbers.
+    /// True if a built-in is a function of single numbers.
     fn is_on_numbers(&self, builtin: u32) -> bool {
         let scalar = &self.builtins.get(builtin).scalar;
         matches!(
@@ -336,7 +335,7 @@ impl Compiler<'_> {
 
     /// Returns a slot that only computes, with its operands.
     fn computation(&self, slot: Slot) -> Option<(Slot, Vec<Operand>)> {
-        let op = &self.ops[slot as usize];
+        let op = &self.ops[slot];
         let mut operands = Vec::new();
         match op {
             Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. } => {}

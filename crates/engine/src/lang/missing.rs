@@ -16,7 +16,7 @@ pub struct Missing {
     pub name: Arc<str>,
     /// The line and the column in the file, from 1.
     pub at: (usize, usize),
-    /// What is written there.
+    /// The text of the entry.
     pub text: Box<str>,
     /// Why it is missing.
     pub why: Why,
@@ -90,7 +90,7 @@ impl Missing {
     }
 }
 
-/// Whether a value is missing: an entry that was left out, `nothing` or NaN.
+/// True if a value is missing: an entry that was left out, `nothing` or NaN.
 ///
 /// # Errors
 /// If it is an entry that cannot be read, which is a mistake in the file.

@@ -11,6 +11,7 @@ pub mod code;
 pub(crate) mod density;
 pub mod error;
 mod fault;
+pub mod ids;
 pub mod index;
 pub mod key;
 pub mod load;

@@ -30,16 +30,16 @@ pub struct DeclaredKernel {
     pub params: Box<[(Arc<str>, Option<Formula>)]>,
     /// Its statements.
     pub steps: Box<[Step]>,
-    /// Whether it proposes values itself, instead of applying other kernels.
+    /// True if it proposes values itself, instead of applying other kernels.
     pub proposes: bool,
-    /// Whether it contains a map.
+    /// True if it contains a map.
     pub maps: bool,
 }
 
 /// A statement of an inference block or a declared kernel.
 #[derive(Clone, Debug)]
 pub struct Step {
-    /// What it does.
+    /// Its action.
     pub kind: StepKind,
     /// The whole statement.
     pub span: Span,
@@ -104,7 +104,7 @@ impl Step {
         })
     }
 
-    /// Whether it, or a statement inside of it, is such a one.
+    /// True if it, or a statement inside of it, is such a one.
     pub fn any(&self, is: &impl Fn(&StepKind) -> bool) -> bool {
         is(&self.kind) || self.body().iter().any(|s| s.any(is))
     }
@@ -145,7 +145,7 @@ pub struct KernelCall {
     pub kernel: Callee,
     /// One argument per parameter of the kernel.
     pub args: Box<[Argument]>,
-    /// Whether it means the same whenever it is applied.
+    /// True if it means the same whenever it is applied.
     pub is_constant: bool,
 }
 
@@ -309,9 +309,9 @@ pub enum FormulaKind {
         block: BlockId,
         /// Its arguments.
         given: Box<[Given]>,
-        /// Whether it reads nothing else of the state.
+        /// True if it reads nothing else of the state.
         is_closed: bool,
-        /// Whether what else it reads depends on no choice.
+        /// True if what else it reads depends on no choice.
         is_settled: bool,
     },
 }
@@ -337,7 +337,7 @@ impl Formula {
         Formula { kind: FormulaKind::Const(value), span }
     }
 
-    /// Whether its value is always the same.
+    /// True if its value is always the same.
     pub fn is_constant(&self) -> bool {
         match &self.kind {
             FormulaKind::Const(_) => true,

@@ -10,6 +10,7 @@
 
 use super::adjoint::Adjoint;
 use super::fault::Fault;
+use super::ids::{BlockId, FrameId, NodeId};
 use indexmap::IndexMap;
 use pcadlang_numerics::dist::{Datum, Dist};
 use pcadlang_numerics::rng::Stream;
@@ -59,9 +60,9 @@ pub type Record = IndexMap<Arc<str>, Value>;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Closure {
     /// The function's block.
-    pub block: u32,
+    pub block: BlockId,
     /// The frame in which it was created.
-    pub frame: u32,
+    pub frame: FrameId,
 }
 
 /// A reference to a node of the trace that holds structure rather than a value. The
@@ -70,7 +71,7 @@ pub struct Closure {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NodeRef {
     /// The node.
-    pub node: u32,
+    pub node: NodeId,
     /// Its version.
     pub version: u32,
 }
@@ -152,7 +153,7 @@ pub trait Likelihood: fmt::Debug + Send + Sync {
         None
     }
 
-    /// Whether the density has steps, so that [`Likelihood::gradient`] is that of a smoothed
+    /// True if the density has steps, so that [`Likelihood::gradient`] is that of a smoothed
     /// one: trajectories that follow it are mostly rejected.
     fn has_steps(&self) -> bool {
         false
@@ -188,7 +189,7 @@ pub const MOST_ELEMENTS: usize = 10_000_000;
 /// The maximum nesting depth of arrays and records, distributions, and covariances.
 pub const MOST_NESTED: u32 = 200;
 
-/// Whether a value is within the limits.
+/// True if a value is within the limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
     /// It is.
@@ -288,7 +289,7 @@ impl Value {
         }
     }
 
-    /// Whether it is an array or record without elements.
+    /// True if it is an array or record without elements.
     pub fn is_empty(&self) -> bool {
         self.len() == Some(0)
     }
@@ -302,7 +303,7 @@ impl Value {
         }
     }
 
-    /// Whether two values are the same to the last bit. Shared data are compared by
+    /// True if two values are the same to the last bit. Shared data are compared by
     /// pointer first, objects only by pointer. It is used to stop propagation, so a false
     /// negative costs time but is never wrong.
     pub fn same(&self, other: &Value) -> bool {

@@ -6,8 +6,14 @@
 //! of its history. Members that appear or vanish during an update are noted, and the list
 //! is updated at its end.
 
-use super::node::NodeId;
+use super::journal::Entry;
+use super::node::*;
 use super::select::Selector;
+use super::store::Store;
+use super::terms::{pop_key, push_key};
+use super::update::{Failure, Update};
+use crate::lang::error::FaultKind;
+use pcadlang_numerics::dist::Dist;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
@@ -138,5 +144,96 @@ impl Choices {
             m.added.clear();
             m.removed.clear();
         }
+    }
+
+    /// Registers a selection, or returns the one already registered for this selector.
+    pub fn selection(&mut self, store: &Store, selector: &Selector) -> Selection {
+        if let Some(i) = self.selections.iter().position(|m| m.selector == *selector) {
+            return Selection(i as u32);
+        }
+        let all = self.selections[0].listed.clone();
+        let listed = all.0.iter().zip(all.1.iter()).filter(|(_, t)| store.selects(selector, t));
+        let (hashes, targets) = listed.map(|(hash, t)| (*hash, *t)).unzip();
+        let members = Members::new(selector.clone(), hashes, targets);
+        self.selections.push(members);
+        Selection(self.selections.len() as u32 - 1)
+    }
+
+    /// Registers a new choice.
+    pub fn register(
+        &mut self,
+        (store, update): (&Store, &mut Update),
+        n: NodeId,
+        hash: u64,
+        elements: Option<usize>,
+        dist: &Dist,
+    ) {
+        if let Some(old) = self.by_address.insert(hash, n)
+            && old != n
+        {
+            self.suspects.push((old, n));
+            update.note(Entry::AddressShadowed(hash, old));
+        }
+        update.note(Entry::ChoiceAdded(n, hash));
+        let needs_facts = self.selections.len() > 1;
+        let needs_address = self.selections.iter().any(|m| m.selector.needs_address());
+        let mut facts = needs_facts.then(|| store.facts(n, needs_address, Some(dist)));
+        for i in 0..self.selections.len() {
+            for e in 0..elements.unwrap_or(1) {
+                let element = if elements.is_some() { e as u32 } else { NONE };
+                let selected = match &mut facts {
+                    None => true,
+                    Some(f) if element != NONE && needs_address => {
+                        push_key(&mut f.address, element);
+                        let yes = self.selections[i].selector.selects(f);
+                        pop_key(&mut f.address);
+                        yes
+                    }
+                    Some(f) => self.selections[i].selector.selects(f),
+                };
+                if selected {
+                    self.selections[i].added.push((hash, Target { node: n, element }));
+                }
+            }
+        }
+    }
+
+    /// Removes a choice from the register.
+    pub fn unregister(&mut self, update: &mut Update, n: NodeId, hash: u64) {
+        if self.by_address.get(&hash) == Some(&n) {
+            self.by_address.remove(&hash);
+            update.note(Entry::ChoiceRemoved(n, hash));
+        }
+        for m in &mut self.selections {
+            let before = m.added.len();
+            m.added.retain(|(_, t)| t.node != n);
+            if m.added.len() == before {
+                m.removed.push((hash, n));
+            }
+        }
+    }
+
+    /// Ends an update: updates the members of selections, and fails at the second of two
+    /// choices with the same address.
+    pub fn update_selections(&mut self, store: &Store, update: &mut Update) -> Result<(), Failure> {
+        for i in 0..self.selections.len() {
+            if let Some(before) = self.selections[i].apply() {
+                update.note(Entry::TargetsReplaced { selection: i as u32, before });
+            }
+        }
+        self.check_duplicates(store)
+    }
+
+    /// Fails if two choices have the same address, at the second of them.
+    fn check_duplicates(&mut self, store: &Store) -> Result<(), Failure> {
+        for (old, new) in std::mem::take(&mut self.suspects) {
+            let alive = |n: NodeId| store[n].state != State::Empty;
+            if alive(old) && alive(new) {
+                let message = format!("a second choice at the address {}", store.address(new));
+                let hint = Some("give each choice its own name or key".to_owned());
+                return Err(store.fail(new, FaultKind::Duplicate, message, hint));
+            }
+        }
+        Ok(())
     }
 }

@@ -17,8 +17,8 @@ pub type CoarseState = (u64, Vec<(u64, f64)>);
 /// The coordinates that are kept.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Coarse {
-    /// By node and element.
-    kept: FxHashMap<(u32, u32), f64>,
+    /// By choice or element.
+    kept: FxHashMap<Target, f64>,
     /// The number of commits, which tells apart the draws of coordinates.
     commits: u64,
 }
@@ -27,12 +27,12 @@ impl Trace {
     /// Keeps the coordinates of the pending changes, which are being committed.
     pub(super) fn keep_pending(&mut self) {
         self.coarse.commits += 1;
-        for p in &self.graph.pending {
+        for p in &self.graph.update.pending {
             if let Change::Free(y) = &p.change
                 && let [y] = y[..]
                 && Support::COARSE.contains(&y)
             {
-                self.coarse.kept.insert((p.node, p.element), y);
+                self.coarse.kept.insert(Target { node: p.node, element: p.element }, y);
             }
         }
     }
@@ -47,7 +47,7 @@ impl Trace {
         self.coarse.commits += 1;
         for (t, y) in targets.iter().zip(coordinates) {
             if let Some(y) = y {
-                self.coarse.kept.insert((t.node, t.element), y);
+                self.coarse.kept.insert(*t, y);
             }
         }
     }
@@ -56,7 +56,7 @@ impl Trace {
     /// one that was kept, or one of those beyond the last double before a pole, drawn anew
     /// after each commit.
     pub(super) fn coarse_coordinate(&self, t: Target, support: &Support, x: f64) -> Option<f64> {
-        let kept = self.coarse.kept.get(&(t.node, t.element)).copied();
+        let kept = self.coarse.kept.get(&t).copied();
         let uniform = || {
             let key = StreamKey::new(self.address_hash(t), 0, Purpose::VALUES);
             key.stream(self.coarse.commits, 0, 0).open_uniform()
@@ -64,12 +64,12 @@ impl Trace {
         support.coarse_coordinate(x, kept, uniform)
     }
 
-    /// What a checkpoint keeps of this: the number of commits, and coordinates by the
+    /// The part of this that a checkpoint keeps: the number of commits, and coordinates by the
     /// hashes of their choices' addresses.
     #[doc(hidden)]
     pub fn coarse_state(&self) -> CoarseState {
         let one = |t: &Target| {
-            let kept = self.coarse.kept.get(&(t.node, t.element))?;
+            let kept = self.coarse.kept.get(t)?;
             Some((self.address_hash(*t), *kept))
         };
         let all = if self.coarse.kept.is_empty() { &[][..] } else { self.all_targets() };
@@ -84,9 +84,9 @@ impl Trace {
             return;
         }
         let by_hash: FxHashMap<u64, f64> = coordinates.iter().copied().collect();
-        for t in self.all_targets().to_vec() {
-            if let Some(y) = by_hash.get(&self.address_hash(t)) {
-                self.coarse.kept.insert((t.node, t.element), *y);
+        for t in &self.all_targets().to_vec() {
+            if let Some(y) = by_hash.get(&self.address_hash(*t)) {
+                self.coarse.kept.insert(*t, *y);
             }
         }
     }

@@ -1,13 +1,13 @@
 //! Explanations of a trace: what an update of a choice would affect, and which choices
 //! something depends on.
 //!
-//! What is affected is found by invalidation, as in an update (`invalidate.rs`), which is
+//! The affected part is found by invalidation, as in an update (`invalidate.rs`), which is
 //! then undone. Nothing is evaluated.
 
-use super::graph::Graph;
 use super::node::*;
+use super::store::Store;
 use super::{Address, Target, Trace};
-use crate::lang::code::{Callee, Code, Op, Operand};
+use crate::lang::code::Op;
 use pcadlang_numerics::num::ExactSum;
 use pcadlang_syntax::span::Span;
 use rustc_hash::FxHashSet;
@@ -65,16 +65,16 @@ impl Trace {
     pub fn dependents(&mut self, t: Target) -> Dependents {
         self.rollback();
         let before = self.graph.begin();
-        self.graph.invalidate_target(&self.code, t.node);
-        let reach = self.graph.dependents_of(&self.code, t.node);
-        self.graph.rollback(&self.code, before);
+        self.graph.update.invalidate_target(&mut self.graph.store, &self.code, t.node);
+        let reach = self.graph.dependents_of(t.node);
+        self.graph.rollback(before);
         reach
     }
 
     /// Returns the choices that a choice's distribution depends on and those that decide
     /// whether it exists, by address.
     pub fn origins(&self, t: Target) -> Vec<Address> {
-        self.graph.origins(&self.code, t.node)
+        self.graph.origins(t.node)
     }
 }
 
@@ -82,10 +82,10 @@ impl Trace {
     /// Returns the source spans of draws that have no choice in this state because no
     /// observation depends on them, in source order.
     pub fn undrawn(&self) -> Vec<Span> {
-        let there: FxHashSet<u32> =
-            self.graph.nodes.iter().filter(|n| n.state == State::Clean).map(|n| n.op).collect();
-        let written = self.code.blocks.iter().flat_map(|b| (b.first..).zip(&b.spans));
-        let is_choice = |op: &u32| matches!(self.code.ops.get(*op as usize), Some(Op::Draw { .. }));
+        let there: FxHashSet<OpId> = self.graph.clean().map(|n| self.graph.store[n].op).collect();
+        let written =
+            self.code.blocks.iter().flat_map(|b| b.slots().map(|s| b.first + s).zip(&b.spans));
+        let is_choice = |op: &OpId| matches!(self.code.ops.get(op.index()), Some(Op::Draw { .. }));
         let absent = written.filter(|(op, _)| is_choice(op) && !there.contains(op));
         let mut spans: Vec<Span> = absent.map(|(_, span)| *span).collect();
         spans.sort_by_key(|s| (s.file, s.start));
@@ -93,33 +93,33 @@ impl Trace {
     }
 }
 
-impl Graph {
+impl Store {
     /// Collects the stale nodes, except the choice at which invalidation started.
-    fn dependents_of(&self, code: &Code, from: NodeId) -> Dependents {
+    fn dependents_of(&self, from: NodeId) -> Dependents {
         let mut reach = Dependents::default();
         let mut add = |n: NodeId, term, effect| {
-            let address = self.address(code, n);
+            let address = self.address(n);
             reach.terms.push(Dependent { address, term, effect, log_density: self.term_score(n) });
         };
-        for (n, node) in (0..).zip(&self.nodes) {
+        for (n, node) in self.nodes() {
             let is_marked = node.state == State::Stale;
             if n == from || !(is_marked || node.state == State::Clean) {
                 continue;
             }
-            let term = match self.op(code, n) {
+            let term = match self.op(n) {
                 Op::Draw { .. } => Term::Choice,
                 Op::Observe { .. } => Term::Observation,
                 Op::Factor { .. } => Term::Factor,
                 _ => {
                     reach.values += usize::from(is_marked);
-                    reach.names.extend(self.name_of(code, n).filter(|_| is_marked));
+                    reach.names.extend(self.name_of(n).filter(|_| is_marked));
                     continue;
                 }
             };
-            if self.hangs_on_marked(code, n) {
+            if self.hangs_on_marked(n) {
                 add(n, term, Effect::Structural);
             } else if is_marked {
-                let moves = term == Term::Choice && self.may_be_redrawn(code, n);
+                let moves = term == Term::Choice && self.may_be_redrawn(n);
                 add(n, term, if moves { Effect::Moved } else { Effect::Scored });
             }
         }
@@ -131,7 +131,7 @@ impl Graph {
     /// factor.
     fn term_score(&self, n: NodeId) -> f64 {
         let mut sum = ExactSum::default();
-        match self.nodes[n as usize].side.as_deref() {
+        match self[n].side.as_deref() {
             Some(Side::Choice(c)) if c.elements != NONE => {
                 c.scores.iter().for_each(|s| sum.add(*s))
             }
@@ -140,47 +140,29 @@ impl Graph {
         sum.value()
     }
 
-    /// Whether a node that decides whether `n` exists is stale: the condition of a branch
+    /// True if a node that decides whether `n` exists is stale: the condition of a branch
     /// around it, or what a loop runs over.
-    fn hangs_on_marked(&self, code: &Code, n: NodeId) -> bool {
-        let mut deciding = Vec::new();
-        self.deciding(code, n, &mut deciding);
-        deciding.iter().any(|d| self.nodes[*d as usize].state == State::Stale)
-    }
-
-    /// Collects the nodes that decide whether `n` exists.
-    fn deciding(&self, code: &Code, n: NodeId, into: &mut Vec<NodeId>) {
-        let mut frame = self.nodes[n as usize].frame;
-        loop {
-            let owner = self.frames[frame as usize].owner;
-            if owner == NONE {
-                return;
-            }
-            frame = self.nodes[owner as usize].frame;
-            let mut by = |o: Operand| into.extend(self.resolve(frame, o));
-            match self.op(code, owner) {
-                Op::If { cond, .. } => by(*cond),
-                Op::For { iter, .. } => by(*iter),
-                Op::Map { over, .. } | Op::Fold { over, .. } => by(*over),
-                Op::Call { callee: Callee::Value(f), .. } => by(*f),
-                _ => {}
-            }
+    fn hangs_on_marked(&self, n: NodeId) -> bool {
+        let mut found = false;
+        for owner in self.owners(n) {
+            self.deciders(owner, |d| found |= self[d].state == State::Stale);
         }
+        found
     }
 
-    fn origins(&self, code: &Code, n: NodeId) -> Vec<Address> {
-        let mut seen = vec![false; self.nodes.len()];
+    fn origins(&self, n: NodeId) -> Vec<Address> {
+        let mut seen = vec![false; self.len()];
         let mut open = Vec::new();
-        self.each_dep(code, n, |d, _| open.push(d));
-        self.deciding(code, n, &mut open);
+        self.each_dep(n, |d, _| open.push(d));
+        self.owners(n).for_each(|owner| self.deciders(owner, |d| open.push(d)));
         let mut found = Vec::new();
         while let Some(d) = open.pop() {
-            if std::mem::replace(&mut seen[d as usize], true) {
+            if std::mem::replace(&mut seen[d], true) {
                 continue;
             }
-            match self.op(code, d) {
-                Op::Draw { .. } if d != n => found.push(self.address(code, d)),
-                _ => self.each_dep(code, d, |e, _| open.push(e)),
+            match self.op(d) {
+                Op::Draw { .. } if d != n => found.push(self.address(d)),
+                _ => self.each_dep(d, |e, _| open.push(e)),
             }
         }
         found.sort();

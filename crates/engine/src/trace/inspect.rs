@@ -1,9 +1,9 @@
 //! The contents of a trace: selections, choices by address, values, distributions,
 //! observations.
 
-use super::node::{self, NONE, State};
+use super::node::{self, NONE, NodeId, State};
 use super::{Address, Selection, Selector, Target, Trace};
-use super::{eval, update};
+use super::{eval, terms};
 use crate::lang::code::{DistSpec, Op};
 use crate::lang::value::{Likelihood, Located, Value};
 use pcadlang_numerics::dist::{Datum, Dist, Support};
@@ -13,7 +13,7 @@ impl Trace {
     /// Registers a selection, whose members are kept up to date from then on.
     pub fn select(&mut self, selector: &Selector) -> Selection {
         self.rollback();
-        self.graph.selection(&self.code, selector)
+        self.graph.choices.selection(&self.graph.store, selector)
     }
 
     /// Returns the current members of a selection.
@@ -54,39 +54,36 @@ impl Trace {
         let mut whole = address.clone();
         let key = whole.segments.last_mut()?.keys.pop()?;
         let n = self.graph.choices.find(whole.hash64())?;
-        let elements = match self.graph.nodes[n as usize].side.as_deref() {
-            Some(node::Side::Choice(c)) if c.elements != NONE => c.elements,
-            _ => return None,
-        };
+        let elements = self.graph.choice_of(n).map(|c| c.elements).filter(|e| *e != NONE)?;
         let element = key.as_index().filter(|i| *i < elements as usize)?;
         Some(Target { node: n, element: element as u32 })
     }
 
     /// Returns the address of a choice.
     pub fn address(&self, t: Target) -> Address {
-        let mut a = self.graph.address(&self.code, t.node);
+        let mut a = self.graph.address(t.node);
         if t.element != NONE {
-            update::push_key(&mut a, t.element);
+            terms::push_key(&mut a, t.element);
         }
         a
     }
 
     /// Returns a hash of the address of a choice, stable between runs.
     pub fn address_hash(&self, t: Target) -> u64 {
-        let h = self.graph.choice_hash(&self.code, t.node);
+        let h = self.graph.choice_hash(t.node);
         if t.element == NONE { h } else { eval::choice::element_hash(h, t.element as usize) }
     }
 
-    /// Whether a target that was listed earlier is still a choice of this trace.
+    /// True if a target that was listed earlier is still a choice of this trace.
     pub fn is_active(&self, t: Target) -> bool {
-        let node = self.graph.nodes.get(t.node as usize);
+        let node = self.graph.store.get(t.node);
         node.is_some_and(|n| n.state == State::Clean)
-            && matches!(self.graph.op(&self.code, t.node), Op::Draw { .. })
+            && matches!(self.graph.op(t.node), Op::Draw { .. })
     }
 
     /// Returns the value of a choice as the program sees it.
     pub fn value(&self, t: Target) -> Value {
-        let v = &self.graph.nodes[t.node as usize].value;
+        let v = &self.graph.store[t.node].value;
         if t.element == NONE {
             v.clone()
         } else {
@@ -130,19 +127,15 @@ impl Trace {
 
     /// Returns the current distribution of a choice.
     pub fn dist(&self, t: Target) -> Option<Dist> {
-        let d = self.graph.dist_of(&self.code, t.node)?;
+        let d = self.graph.dist_of(t.node)?;
         Some(if t.element == NONE { d } else { d.element(t.element as usize) })
     }
 
     /// Returns the number of elements, if a choice is an array of separately addressed
     /// elements.
     pub fn elements(&self, t: Target) -> Option<usize> {
-        match self.graph.nodes[t.node as usize].side.as_deref() {
-            Some(node::Side::Choice(c)) if c.elements != NONE && t.element == NONE => {
-                Some(c.elements as usize)
-            }
-            _ => None,
-        }
+        let elements = self.graph.choice_of(t.node)?.elements;
+        (elements != NONE && t.element == NONE).then_some(elements as usize)
     }
 
     /// Returns the number of active choices, counting elements separately.
@@ -150,7 +143,7 @@ impl Trace {
         self.all_targets().len()
     }
 
-    /// Whether the state has observations or factors; otherwise draws are those of the prior.
+    /// True if the state has observations or factors; otherwise draws are those of the prior.
     #[doc(hidden)]
     pub fn is_conditioned(&self) -> bool {
         self.scored_nodes().next().is_some()
@@ -165,7 +158,7 @@ impl Trace {
     /// Returns every observation and factor with its log density, in the order of the
     /// program's blocks.
     pub fn observations(&self) -> Vec<(Address, f64)> {
-        self.scored().into_iter().map(|(n, s)| (self.graph.address(&self.code, n), s)).collect()
+        self.scored().into_iter().map(|(n, s)| (self.graph.address(n), s)).collect()
     }
 
     /// Returns everything with log density -∞ and its source span: observations and
@@ -173,8 +166,7 @@ impl Trace {
     pub fn impossible(&self) -> Vec<(Address, pcadlang_syntax::span::Span)> {
         let observed =
             self.scored().into_iter().filter(|(_, s)| *s == f64::NEG_INFINITY).map(|(n, _)| n);
-        let mut found: Vec<_> =
-            observed.map(|n| (self.graph.address(&self.code, n), self.span(n))).collect();
+        let mut found: Vec<_> = observed.map(|n| (self.graph.address(n), self.span(n))).collect();
         let targets = self.all_targets();
         let zero = targets.iter().filter(|t| self.score_of(**t) == f64::NEG_INFINITY);
         let mut chosen: Vec<_> = zero.map(|t| (self.address(*t), self.span(t.node))).collect();
@@ -188,18 +180,16 @@ impl Trace {
     #[doc(hidden)]
     pub fn outside_support(&self) -> Vec<(Address, String)> {
         let zero = self.scored().into_iter().filter(|(_, s)| *s == f64::NEG_INFINITY);
-        let why = |(n, _)| {
-            Some((self.graph.address(&self.code, n), self.graph.outside_support(&self.code, n)?))
-        };
+        let why = |(n, _)| Some((self.graph.address(n), self.graph.outside_support(n)?));
         zero.filter_map(why).collect()
     }
 
-    pub(super) fn span(&self, n: u32) -> pcadlang_syntax::span::Span {
-        let frame = &self.graph.frames[self.graph.nodes[n as usize].frame as usize];
-        self.code.blocks[frame.block as usize].spans[(n - frame.base) as usize]
+    pub(super) fn span(&self, n: NodeId) -> pcadlang_syntax::span::Span {
+        let frame = &self.graph.store[self.graph.store[n].frame];
+        self.code.blocks[frame.block].spans[n - frame.base]
     }
 
-    /// Whether an observation has an unnormalised likelihood, whose scale is a modelling
+    /// True if an observation has an unnormalised likelihood, whose scale is a modelling
     /// decision.
     pub fn is_pseudo(&self) -> bool {
         self.likelihoods().any(|(l, _)| !l.is_proper())
@@ -221,26 +211,19 @@ impl Trace {
     }
 
     /// Iterates over the observations and factors.
-    pub(super) fn scored_nodes(&self) -> impl Iterator<Item = u32> {
-        let nodes = self
-            .graph
-            .nodes
-            .iter()
-            .zip(0..)
-            .filter(|(n, _)| n.state == State::Clean)
-            .map(|(_, i)| i);
-        nodes.filter(|n| {
-            matches!(self.graph.op(&self.code, *n), Op::Observe { .. } | Op::Factor { .. })
-        })
+    pub(super) fn scored_nodes(&self) -> impl Iterator<Item = NodeId> {
+        self.graph
+            .clean()
+            .filter(|n| matches!(self.graph.op(*n), Op::Observe { .. } | Op::Factor { .. }))
     }
 
-    pub(super) fn scored(&self) -> Vec<(u32, f64)> {
+    pub(super) fn scored(&self) -> Vec<(NodeId, f64)> {
         self.scored_nodes().map(|n| (n, self.score_at(n))).collect()
     }
 
     /// Returns the log density of an observation or factor.
-    pub(super) fn score_at(&self, n: u32) -> f64 {
-        let n = &self.graph.nodes[n as usize];
+    pub(super) fn score_at(&self, n: NodeId) -> f64 {
+        let n = &self.graph.store[n];
         match n.side.as_deref() {
             Some(node::Side::Total(t)) if n.score == 0.0 => t.sum.value(),
             _ => n.score,
@@ -252,7 +235,7 @@ impl Trace {
     #[doc(hidden)]
     pub fn with_steps(&self) -> Vec<Address> {
         let stepped = self.likelihoods_at().filter(|(_, l, _)| l.has_steps());
-        stepped.map(|(n, ..)| self.graph.address(&self.code, n)).collect()
+        stepped.map(|(n, ..)| self.graph.address(n)).collect()
     }
 
     /// Iterates over the likelihoods that are not distributions, with the value observed
@@ -262,15 +245,14 @@ impl Trace {
     }
 
     /// The same, with the nodes of the observations.
-    fn likelihoods_at(&self) -> impl Iterator<Item = (u32, &dyn Likelihood, &Value)> {
+    fn likelihoods_at(&self) -> impl Iterator<Item = (NodeId, &dyn Likelihood, &Value)> {
         self.scored_nodes().filter_map(|n| {
-            let Op::Observe { dist: DistSpec::Value(o), value, .. } = self.graph.op(&self.code, n)
-            else {
+            let Op::Observe { dist: DistSpec::Value(o), .. } = self.graph.op(n) else {
                 return None;
             };
-            let frame = self.graph.nodes[n as usize].frame;
-            let Value::Likelihood(l) = self.graph.value(&self.code, frame, *o) else { return None };
-            let observed = self.graph.observed_value(&self.code, n, *value, &mut node::Deps::new());
+            let frame = self.graph.store[n].frame;
+            let Value::Likelihood(l) = self.graph.value(frame, *o) else { return None };
+            let observed = self.graph.observed_value(n);
             Some((n, &**l, observed))
         })
     }

@@ -5,8 +5,9 @@
 //! is saved at each change. The score sums are saved whole. In the steady state nothing
 //! is allocated, because the journal keeps its capacity.
 
-use super::choices::Listed;
+use super::choices::{Choices, Listed};
 use super::node::*;
+use super::store::Store;
 use crate::lang::key::Key;
 use crate::lang::value::Value;
 use pcadlang_numerics::num::ExactSum;
@@ -63,4 +64,77 @@ pub(crate) enum Entry {
 pub(crate) struct Before {
     pub prior: ExactSum,
     pub likelihood: ExactSum,
+}
+
+impl Entry {
+    /// Undoes the mutation.
+    pub fn undo(self, store: &mut Store, choices: &mut Choices) {
+        match self {
+            Entry::Node { id, value, score, refs, changed, state, flags } => {
+                let node = &mut store[id];
+                node.value = value;
+                node.score = score;
+                node.refs = refs;
+                node.changed = changed;
+                node.state = state;
+                node.flags = flags;
+            }
+            Entry::Side(n, side) => store[n].side = side,
+            Entry::Choice(n, old) => {
+                if let Some(Side::Choice(c)) = store[n].side.as_deref_mut() {
+                    *c = *old;
+                }
+            }
+            Entry::Sum(n, old) => {
+                if let Some(Side::Total(t)) = store[n].side.as_deref_mut() {
+                    t.sum = old;
+                }
+            }
+            Entry::TotalDeps(n, old) => {
+                if let Some(Side::Total(t)) = store[n].side.as_deref_mut() {
+                    t.deps = old;
+                }
+            }
+            Entry::FrameMade(f) => store.free_frame(f),
+            Entry::FrameDetached(f) => store[f].attached = true,
+            Entry::PassMade(n, pass) => {
+                if let Some(Side::Loop(l)) = store[n].side.as_deref_mut() {
+                    l.frames[pass as usize] = FrameId::NONE;
+                }
+            }
+            Entry::PassMoved(f, before) => store[f].pass = before,
+            Entry::Memo(n, key, old) => {
+                if let Some(Side::Memo(m)) = store[n].side.as_deref_mut() {
+                    match old {
+                        Some(e) => m.entries.insert(key, e),
+                        None => m.entries.remove(&key),
+                    };
+                }
+            }
+            Entry::Acquired(n, outside) => {
+                store[n].refs -= 1;
+                if outside {
+                    store.outside_mut(n).users.pop();
+                }
+            }
+            Entry::Released(n, outside) => {
+                store[n].refs += 1;
+                if outside {
+                    store.outside_mut(n).gone -= 1;
+                }
+            }
+            Entry::ChoiceAdded(n, hash) => {
+                if choices.find(hash) == Some(n) {
+                    choices.by_address.remove(&hash);
+                }
+            }
+            Entry::ChoiceRemoved(n, hash) | Entry::AddressShadowed(hash, n) => {
+                choices.by_address.insert(hash, n);
+            }
+            Entry::TargetsReplaced { selection, before } => {
+                choices.selections[selection as usize].listed = before;
+            }
+            Entry::Observed(hash, old) => store.undo_observed(hash, old),
+        }
+    }
 }

@@ -2,6 +2,11 @@
 //! is an error with a location in the program, instead of exhausted memory or an endless
 //! run. The numbers are in `docs/reference/limits.md`.
 
+use super::node::NodeId;
+use super::store::Store;
+use super::update::Failure;
+use crate::lang::error::FaultKind;
+use crate::lang::value::{Extent, MOST_ELEMENTS, MOST_NESTED, Value};
 use pcadlang_numerics::platform::clock::Instant;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -74,11 +79,13 @@ pub struct Stop {
     asked: Vec<Arc<AtomicBool>>,
     /// The start and length of the available time.
     time: Option<(Instant, Duration)>,
-    pub(super) patience: Duration,
+    patience: Duration,
 }
 
 /// The default time for which an update may continue after a stop request.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// The number of operations between two checks of flags and clock.
+const BETWEEN_LOOKS: u32 = 1 << 12;
 /// An operation that may render a picture counts as this many.
 const LARGE: u32 = 1 << 8;
 
@@ -119,17 +126,17 @@ impl Stop {
         Stop { patience, ..self }
     }
 
-    /// Whether a flag is set.
+    /// True if a flag is set.
     pub fn is_set(&self) -> bool {
         self.asked.iter().any(|a| a.load(Ordering::Relaxed))
     }
 
-    /// Whether a stop was requested or time is up.
+    /// True if a stop was requested or time is up.
     pub fn is_asked(&self) -> bool {
         self.has_used(1.0)
     }
 
-    /// Whether a stop was requested or this fraction of the time has passed.
+    /// True if a stop was requested or this fraction of the time has passed.
     pub fn has_used(&self, share: f64) -> bool {
         self.is_set()
             || self
@@ -138,19 +145,25 @@ impl Stop {
     }
 }
 
-/// How much of its limits an update has used.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Spent {
-    pub(super) operations: u64,
-    pub(super) elements: u64,
+/// The limits of a trace, and how much of them an update has used.
+#[derive(Clone, Debug)]
+pub(crate) struct Budget {
+    pub limits: Limits,
+    operations: u64,
+    elements: u64,
     /// Evaluations since the last check of the clock, across updates: many short ones
     /// take time as well.
-    pub(super) since_look: u32,
+    since_look: u32,
     /// The time at which it should have stopped.
-    pub(super) late: Option<Instant>,
+    late: Option<Instant>,
 }
 
-impl Spent {
+impl Budget {
+    /// Nothing has been used yet.
+    pub fn new(limits: Limits) -> Budget {
+        Budget { limits, operations: 0, elements: 0, since_look: 0, late: None }
+    }
+
     /// Resets the counts at the start of an update.
     pub fn renew(&mut self) {
         (self.operations, self.elements) = (0, 0);
@@ -160,4 +173,82 @@ impl Spent {
     pub fn count_large(&mut self) {
         self.since_look += LARGE;
     }
+
+    /// Counts one evaluation.
+    #[inline]
+    pub fn count_operation(&mut self, store: &Store, n: NodeId) -> Result<(), Failure> {
+        self.operations += 1;
+        self.since_look += 1;
+        if self.operations > self.limits.operations {
+            let message =
+                format!("one evaluation took more than {} operations", self.limits.operations);
+            return Err(store.fail(n, FaultKind::Limit, message, Some(raise("operations"))));
+        }
+        if self.since_look >= BETWEEN_LOOKS { self.look_at_clock(store, n) } else { Ok(()) }
+    }
+
+    #[cold]
+    fn look_at_clock(&mut self, store: &Store, n: NodeId) -> Result<(), Failure> {
+        self.since_look = 0;
+        if !self.limits.stop.is_asked() {
+            self.late = None;
+            return Ok(());
+        }
+        let since = *self.late.get_or_insert_with(Instant::now);
+        if since.elapsed() < self.limits.stop.patience {
+            return Ok(());
+        }
+        let message = "stopped in the middle of an evaluation".to_owned();
+        let hint = "one evaluation of the program took longer than the remaining time".to_owned();
+        Err(store.fail(n, FaultKind::Stopped, message, Some(hint)))
+    }
+
+    /// Counts the elements of a value that a node made, and rejects values that are too
+    /// large or too deeply nested.
+    #[inline]
+    pub fn count_elements(
+        &mut self,
+        store: &Store,
+        n: NodeId,
+        value: &Value,
+    ) -> Result<(), Failure> {
+        let made = match value {
+            Value::Num(_) | Value::Bool(_) => return Ok(()),
+            Value::Array(xs) => xs.len(),
+            Value::Str(s) => s.len() / 8,
+            Value::List(_) | Value::Record(_) => {
+                check_extent(store, n, value)?;
+                value.len().unwrap_or(0)
+            }
+            Value::Object(o) => {
+                self.count_large();
+                o.own_numbers()
+            }
+            _ => return Ok(()),
+        };
+        self.elements += made as u64;
+        if self.elements > self.limits.elements {
+            let message = format!(
+                "the values made by one evaluation have more than {} elements",
+                self.limits.elements
+            );
+            return Err(store.fail(n, FaultKind::Limit, message, Some(raise("elements"))));
+        }
+        Ok(())
+    }
+}
+
+fn check_extent(store: &Store, n: NodeId, value: &Value) -> Result<(), Failure> {
+    let (message, hint) = match value.extent() {
+        Extent::Fits => return Ok(()),
+        Extent::TooDeep => (
+            format!("arrays and records are nested more than {MOST_NESTED} deep"),
+            "collect growing values in one array: append(xs, x)",
+        ),
+        Extent::TooLarge => (
+            format!("a value with more than {MOST_ELEMENTS} elements, counting nested ones"),
+            "an array that is used several times counts each time",
+        ),
+    };
+    Err(store.fail(n, FaultKind::Limit, message, Some(hint.into())))
 }

@@ -22,9 +22,12 @@ mod path;
 mod propose;
 mod query;
 mod save;
+mod score;
 mod select;
 mod shortcuts;
+mod store;
 mod surrogate;
+mod terms;
 mod update;
 
 pub use crate::lang::address::{Address, AddressSegment, AddressTextError};
@@ -42,6 +45,7 @@ pub use select::{ChoiceKind, Pattern, PatternSegment, Selector};
 
 use crate::lang::code::Code;
 pub use crate::lang::error::RunError;
+pub use crate::lang::ids::NodeId;
 use crate::lang::value::Value;
 use coarse::Coarse;
 #[doc(hidden)]
@@ -49,7 +53,7 @@ pub use gradient::Recording;
 use graph::Graph;
 use journal::Before;
 pub use marginal::{Elimination, Explored, Marginal, Tabulated, Tabulation};
-use node::NONE;
+use node::{FrameId, NONE};
 use std::sync::Arc;
 
 /// One execution of a program: the values of its choices and everything computed from
@@ -79,7 +83,7 @@ impl Trace {
     /// Returns a trace in which nothing has run: queries draw from the prior, and
     /// observations are ignored.
     pub fn prior(code: Arc<Code>, limits: Limits) -> Self {
-        let graph = Graph::new(&code, limits);
+        let graph = Graph::new(Arc::clone(&code), limits);
         Trace { code, graph, update: None, coarse: Coarse::default(), identity: Arc::new(()) }
     }
 
@@ -121,21 +125,22 @@ impl Trace {
     ) -> TraceResult<(Self, Weight)> {
         let mut trace = Trace::prior(code, limits);
         let g = &mut trace.graph;
-        g.spread = spread;
-        g.constraints = constraints.into_iter().collect();
-        g.draws = draws;
+        g.update.spread = spread;
+        g.update.constraints = constraints.into_iter().collect();
+        g.update.draws = draws;
         let before = g.begin();
         let effects = &trace.code.blocks[0].effects;
         for s in effects {
-            g.nodes[*s as usize].refs = 1;
+            let n = g.store[FrameId::ROOT].base + *s;
+            g.store[n].refs = 1;
+            g.update.effects.push(n);
         }
-        g.effects.extend(effects);
-        g.starting = true;
+        g.update.starting = true;
         g.propagate(&trace.code)?;
-        (g.starting, g.spread) = (false, None);
-        let weight = g.weight(&before.prior, &before.likelihood);
-        g.commit(&trace.code);
-        g.constraints.clear();
+        (g.update.starting, g.update.spread) = (false, None);
+        let weight = g.weight(&before);
+        g.commit();
+        g.update.constraints.clear();
         g.revision = 0;
         Ok((trace, weight))
     }
@@ -180,12 +185,12 @@ impl Trace {
     ) -> TraceResult<Weight> {
         self.rollback();
         let before = self.graph.begin();
-        self.graph.draws = draws;
-        self.graph.constraints.extend(constraints.iter().cloned());
+        self.graph.update.draws = draws;
+        self.graph.update.constraints.extend(constraints.iter().cloned());
         self.put_observed(observed);
-        self.graph.queue(&self.code, changes);
+        self.graph.update.queue(&mut self.graph.store, &self.code, changes);
         let propagated = self.graph.propagate(&self.code);
-        self.graph.constraints.clear();
+        self.graph.update.constraints.clear();
         self.pend(before, propagated)
     }
 
@@ -193,12 +198,12 @@ impl Trace {
     fn pend(&mut self, before: Before, propagated: TraceResult<()>) -> TraceResult<Weight> {
         match propagated {
             Ok(()) => {
-                let weight = self.graph.weight(&before.prior, &before.likelihood);
+                let weight = self.graph.weight(&before);
                 self.update = Some(before);
                 Ok(weight)
             }
             Err(e) => {
-                self.graph.rollback(&self.code, before);
+                self.graph.rollback(before);
                 Err(e)
             }
         }
@@ -216,14 +221,19 @@ impl Trace {
     /// Returns the choices that vanish in the pending proposal, with their previous
     /// values.
     pub fn removed(&self) -> Vec<(u64, Constraint)> {
-        self.graph.removed.iter().map(|(_, h, d)| (*h, Constraint::Stored(d.clone()))).collect()
+        self.graph
+            .update
+            .removed
+            .iter()
+            .map(|(_, h, d)| (*h, Constraint::Stored(d.clone())))
+            .collect()
     }
 
-    /// Whether the pending proposal removes a choice. This includes a choice that is
+    /// True if the pending proposal removes a choice. This includes a choice that is
     /// resampled at the same address because its form changed; the value proposed for it
     /// had no effect.
     pub fn was_removed(&self, t: Target) -> bool {
-        self.graph.removed.iter().any(|(n, _, _)| *n == t.node)
+        self.graph.update.removed.iter().any(|(n, _, _)| *n == t.node)
     }
 
     /// Moves to a saved state (see [`Trace::constraints`]); selections stay valid.
@@ -251,30 +261,30 @@ impl Trace {
     pub fn commit(&mut self) {
         if self.update.take().is_some() {
             self.keep_pending();
-            self.graph.commit(&self.code);
+            self.graph.commit();
         }
     }
 
     /// Undoes the pending proposal, if there is one.
     pub fn rollback(&mut self) {
         if let Some(before) = self.update.take() {
-            self.graph.rollback(&self.code, before);
+            self.graph.rollback(before);
         }
     }
 
     /// Returns the log joint density of choices, observations and factors.
     pub fn log_joint(&self) -> f64 {
-        self.graph.log_joint()
+        self.graph.score.log_joint()
     }
 
     /// Returns the prior part of the log joint: the choices.
     pub fn log_prior(&self) -> f64 {
-        self.graph.prior.value()
+        self.graph.score.prior.value()
     }
 
     /// Returns the likelihood part of the log joint: observations and factors.
     pub fn log_likelihood(&self) -> f64 {
-        self.graph.likelihood.value()
+        self.graph.score.likelihood.value()
     }
 
     /// Returns the sum of the log densities of the selected choices: their part of the
@@ -291,7 +301,7 @@ impl Trace {
     /// Returns the log density of a choice under its prior given the rest, in the current
     /// state (including a pending proposal).
     pub fn score_of(&self, t: Target) -> f64 {
-        let node = &self.graph.nodes[t.node as usize];
+        let node = &self.graph.store[t.node];
         match node.side.as_deref() {
             Some(node::Side::Choice(c)) if t.element != NONE => c.scores[t.element as usize],
             _ => node.score,
@@ -321,22 +331,22 @@ impl Trace {
         &self,
         targets: &[Target],
         power: f64,
-        weight: &dyn Fn(u32) -> f64,
+        weight: &dyn Fn(NodeId) -> f64,
         out: &mut Vec<f64>,
     ) -> TraceResult<()> {
-        let mut scored: Vec<u32> = self.all_targets().iter().map(|t| t.node).collect();
+        let mut scored: Vec<NodeId> = self.all_targets().iter().map(|t| t.node).collect();
         scored.dedup();
-        let mut observed: Vec<u32> = self.scored_nodes().collect();
+        let mut observed: Vec<NodeId> = self.scored_nodes().collect();
         self.graph.sort_by_place(&mut observed);
         // Where the data count nothing, a state that they exclude has a gradient.
         if power != 0.0 {
             scored.extend(observed);
         }
         scored.retain(|n| weight(*n) != 0.0);
-        self.graph.gradient(&self.code, targets, &scored, (power, weight), out)
+        self.graph.gradient(targets, &scored, (power, weight), out)
     }
 
-    /// Whether nothing has been committed since the program was run.
+    /// True if nothing has been committed since the program was run.
     #[doc(hidden)]
     pub fn is_new(&self) -> bool {
         self.graph.revision == 0
@@ -345,25 +355,25 @@ impl Trace {
     /// Turns incremental updates off (every proposal then re-runs the whole program) or
     /// on again; chains are the same either way.
     pub fn set_incremental(&mut self, on: bool) {
-        self.graph.incremental = on;
+        self.graph.store.incremental = on;
     }
 
     /// Replaces the limits on what updates may build.
     #[doc(hidden)]
     pub fn set_limits(&mut self, limits: Limits) {
-        self.graph.limits = limits;
+        self.graph.budget.limits = limits;
     }
 
     /// Returns the limits on what updates may build.
     pub fn limits(&self) -> &Limits {
-        &self.graph.limits
+        &self.graph.budget.limits
     }
 
     /// Returns the condition that interrupts updates, and searches that consist of many
     /// updates.
     #[doc(hidden)]
     pub fn stop(&self) -> &Stop {
-        &self.graph.limits.stop
+        &self.graph.budget.limits.stop
     }
 
     /// Starts to record which operations are executed.
@@ -377,7 +387,7 @@ impl Trace {
     #[doc(hidden)]
     pub fn executed(&mut self) -> Vec<pcadlang_syntax::span::Span> {
         let log = self.graph.execution_log.take().unwrap_or_default();
-        log.into_iter().map(|(b, s)| self.code.blocks[b as usize].spans[s as usize]).collect()
+        log.into_iter().map(|(b, s)| self.code.blocks[b].spans[s]).collect()
     }
 
     /// Runs the program again from scratch with the same choices, to check the
@@ -390,7 +400,7 @@ impl Trace {
             self.present_code(),
             self.constraints(),
             Draws::default(),
-            self.graph.limits.clone(),
+            self.graph.budget.limits.clone(),
         )
         .map(|(t, _)| t)
     }
@@ -406,17 +416,22 @@ impl Trace {
         constraints: impl IntoIterator<Item = (u64, Constraint)>,
         draws: Draws,
     ) -> TraceResult<Trace> {
-        let mut trace =
-            Trace::generate(self.present_code(), constraints, draws, self.graph.limits.clone())?.0;
-        trace.graph.incremental = self.graph.incremental;
+        let mut trace = Trace::generate(
+            self.present_code(),
+            constraints,
+            draws,
+            self.graph.budget.limits.clone(),
+        )?
+        .0;
+        trace.graph.store.incremental = self.graph.store.incremental;
         Ok(trace)
     }
 
     /// The program, with the values that are currently observed.
     fn present_code(&self) -> Arc<Code> {
-        match Arc::ptr_eq(&self.graph.observed, &self.code.observed) {
+        match Arc::ptr_eq(&self.graph.store.observed, &self.code.observed) {
             true => Arc::clone(&self.code),
-            false => Arc::new(self.code.with_observed(Arc::clone(&self.graph.observed))),
+            false => Arc::new(self.code.with_observed(Arc::clone(&self.graph.store.observed))),
         }
     }
 

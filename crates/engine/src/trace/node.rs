@@ -14,15 +14,12 @@ use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-/// The index of a node.
-pub(crate) type NodeId = u32;
-/// The index of a frame.
-pub(crate) type FrameId = u32;
+pub(crate) use crate::lang::ids::{BlockId, FrameId, NodeId, OpId, SiteId, Slot};
 
-/// No node or no frame.
+/// Not an element: a whole choice.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// Whether a node's value is up to date.
+/// True if a node's value is up to date.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum State {
     /// Not evaluated: nothing needs it.
@@ -56,12 +53,12 @@ pub(crate) const SAVED: u8 = 32;
 pub(crate) struct Node {
     /// Its value; `nothing` while empty.
     pub value: Value,
-    /// Whether its value is up to date.
+    /// True if its value is up to date.
     pub state: State,
     /// [`HELD`], [`TARGET`], [`WAS_STALE`], [`IMPROPER`], [`OTHERWISE`], [`SAVED`].
     pub flags: u8,
     /// Its operation, by index in [`crate::lang::code::Code::ops`].
-    pub op: u32,
+    pub op: OpId,
     /// Its contribution to the log joint, if that is a single term.
     pub score: f64,
     /// Data that only structural nodes and vector choices need.
@@ -101,6 +98,32 @@ pub(crate) enum Side {
     Choice(ChoiceSide),
     /// An observed array, or an observation that reads containers.
     Total(Total),
+}
+
+impl Side {
+    /// Returns the nodes held besides the operands and the result.
+    pub fn deps(&self) -> &[NodeId] {
+        match self {
+            Side::Deps(deps)
+            | Side::Kept(Kept { deps, .. })
+            | Side::MemoCall(MemoCall { deps, .. })
+            | Side::Loop(Loop { deps, .. })
+            | Side::Table(Table { deps, .. })
+            | Side::Choice(ChoiceSide { deps, .. })
+            | Side::Total(Total { deps, .. }) => deps,
+            Side::Child(_) | Side::Memo(_) => &[],
+        }
+    }
+
+    /// Returns where the node with the result of a call, branch or loop is kept.
+    pub fn result(&mut self) -> Option<&mut NodeId> {
+        match self {
+            Side::Child(Child { result, .. })
+            | Side::MemoCall(MemoCall { result, .. })
+            | Side::Loop(Loop { result, .. }) => Some(result),
+            _ => None,
+        }
+    }
 }
 
 /// Nodes held besides the operands.
@@ -156,7 +179,7 @@ pub(crate) struct Loop {
     /// The frames; [`NONE`] for a pass that nothing has needed yet.
     pub frames: Vec<FrameId>,
     /// The block of the body and its lexical parent frame.
-    pub block: u32,
+    pub block: BlockId,
     /// See `block`.
     pub parent: FrameId,
     /// For `fold`: the node with the last result.
@@ -227,7 +250,7 @@ pub(crate) struct Element {
 #[derive(Clone, Debug)]
 pub(crate) struct Memo {
     /// The function.
-    pub block: u32,
+    pub block: BlockId,
     /// Its lexical parent frame.
     pub parent: FrameId,
     /// The live entries: frame and number of calls that use each.
@@ -249,6 +272,13 @@ pub(crate) struct ChoiceSide {
     pub deps: Deps,
 }
 
+impl Default for ChoiceSide {
+    fn default() -> ChoiceSide {
+        let (stored, scores, deps) = (None, Vec::new(), Deps::new());
+        ChoiceSide { stored, scores, elements: NONE, hash: None, deps }
+    }
+}
+
 /// The source of a function's parameters.
 #[derive(Clone, Debug)]
 pub(crate) enum Arguments {
@@ -268,11 +298,11 @@ pub(crate) enum Arguments {
     Supplied(Arc<[Result<Value, Box<RunError>>]>),
 }
 
-/// One instance of a block.
+/// One instance of a block; by default, of the top level.
 #[derive(Clone, Debug)]
 pub(crate) struct Frame {
     /// The block.
-    pub block: u32,
+    pub block: BlockId,
     /// The frame of the lexically enclosing block.
     pub parent: FrameId,
     /// The node that made it; [`NONE`] for the top level.
@@ -289,8 +319,25 @@ pub(crate) struct Frame {
     pub key: Option<Key>,
     /// The source of its parameters.
     pub args: Arguments,
-    /// Whether its owner still uses it.
+    /// True if its owner still uses it.
     pub attached: bool,
+}
+
+impl Default for Frame {
+    fn default() -> Frame {
+        Frame {
+            block: BlockId::ROOT,
+            parent: FrameId::NONE,
+            owner: NodeId::NONE,
+            base: NodeId(0),
+            path: 0,
+            depth: 0,
+            pass: 0,
+            key: None,
+            args: Arguments::None,
+            attached: true,
+        }
+    }
 }
 
 /// Users of a node that cannot be derived from its block.
@@ -300,4 +347,11 @@ pub(crate) struct Outside {
     pub users: SmallVec<[NodeId; 4]>,
     /// How many have.
     pub gone: u32,
+}
+
+impl Outside {
+    /// True if most of the users have released the node.
+    pub fn is_untidy(&self) -> bool {
+        self.gone as usize * 2 > self.users.len()
+    }
 }

@@ -10,13 +10,10 @@
 use super::graph::Graph;
 use super::journal::Entry;
 use super::node::*;
-use super::update::Failure;
 use super::{Address, Draws, Trace, TraceResult, Weight};
-use crate::lang::code::{Code, DistSpec, Observed, Op, Operand};
-use crate::lang::density::{is_repeated, pointwise};
+use crate::lang::code::{DistSpec, Observed, Op};
+use crate::lang::density::pointwise;
 use crate::lang::value::Value;
-use pcadlang_numerics::dist::{Datum, Dist, Support};
-use pcadlang_numerics::rng::Stream;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
@@ -46,12 +43,10 @@ pub struct Replicate {
 impl Trace {
     /// Returns the observations with their values, by address; factors are not included.
     pub fn observed(&self) -> Vec<Observation> {
-        let (g, code) = (&self.graph, &*self.code);
+        let g = &self.graph;
         let one = |n: NodeId| {
-            let Op::Observe { value, site, .. } = g.op(code, n) else { return None };
-            let hash = g.site_hash(code, g.nodes[n as usize].frame, *site);
-            let value = g.observed_value(code, n, *value, &mut Deps::new()).clone();
-            Some(Observation { address: g.address(code, n), hash, value })
+            let (hash, value) = (g.observation_hash(n)?, g.observed_value(n).clone());
+            Some(Observation { address: g.address(n), hash, value })
         };
         let mut all: Vec<_> = self.scored_nodes().filter_map(one).collect();
         all.sort_by(|a, b| a.address.cmp(&b.address));
@@ -64,17 +59,16 @@ impl Trace {
     /// # Errors
     /// If a likelihood fails while it samples.
     pub fn replicate(&self, draws: Draws) -> TraceResult<Replicate> {
-        let (g, code) = (&self.graph, &*self.code);
+        let g = &self.graph;
         let mut all = Vec::new();
         let mut silent = Vec::new();
         for n in self.scored_nodes() {
-            let address = g.address(code, n);
-            let Op::Observe { site, .. } = g.op(code, n) else {
+            let address = g.address(n);
+            let Some(hash) = g.observation_hash(n) else {
                 silent.push((address, "a factor".to_owned()));
                 continue;
             };
-            let hash = g.site_hash(code, g.nodes[n as usize].frame, *site);
-            match g.draw_observed(code, n, &mut draws.stream(hash))? {
+            match g.draw_observed(n, &mut draws.stream(hash))? {
                 Ok(value) => all.push((address, hash, value)),
                 Err(what) => silent.push((address, what)),
             }
@@ -102,16 +96,17 @@ impl Trace {
     /// elements). Sorted by hash, so that the same observations come in the same order.
     /// `None` if there are more than `most` values.
     pub fn pointwise(&self, most: usize) -> Option<Vec<(u64, Vec<f64>)>> {
-        let (g, code) = (&self.graph, &*self.code);
+        let g = &self.graph;
         let (mut all, mut count) = (Vec::new(), 0);
         for n in self.scored_nodes() {
-            let Op::Observe { dist: spec, value, site, .. } = g.op(code, n) else { continue };
-            let (mut deps, frame) = (Deps::new(), g.nodes[n as usize].frame);
-            let observed = g.observed_value(code, n, *value, &mut deps);
-            let likelihood = matches!(spec, DistSpec::Value(o) if !matches!(g.value(code, frame, *o), Value::Dist(_)));
+            let Op::Observe { dist: spec, site, .. } = g.op(n) else { continue };
+            let frame = g.store[n].frame;
+            let observed = g.observed_value(n);
+            let likelihood =
+                matches!(spec, DistSpec::Value(o) if !matches!(g.value(frame, *o), Value::Dist(_)));
             let scores = match likelihood {
                 true => vec![self.score_at(n)],
-                false => match g.make_dist(code, n, frame, spec, &mut deps) {
+                false => match g.make_dist(n, spec) {
                     Ok(dist) => pointwise(&dist, observed),
                     Err(_) => vec![f64::NAN],
                 },
@@ -120,7 +115,7 @@ impl Trace {
             if count > most {
                 return None;
             }
-            all.push((g.site_hash(code, frame, *site), scores));
+            all.push((g.site_hash(frame, *site), scores));
         }
         all.sort_by_key(|(hash, _)| *hash);
         Some(all)
@@ -157,13 +152,7 @@ impl Trace {
 
     /// Returns the observations by the hashes of their addresses.
     pub(super) fn observation_nodes(&self) -> FxHashMap<u64, NodeId> {
-        let (g, code) = (&self.graph, &*self.code);
-        let hashed = |n: NodeId| match g.op(code, n) {
-            Op::Observe { site, .. } => {
-                Some((g.site_hash(code, g.nodes[n as usize].frame, *site), n))
-            }
-            _ => None,
-        };
+        let hashed = |n| Some((self.graph.observation_hash(n)?, n));
         self.scored_nodes().filter_map(hashed).collect()
     }
 
@@ -174,11 +163,13 @@ impl Trace {
         }
         let nodes = self.observation_nodes();
         for (hash, value) in values {
-            self.graph.put_observed(*hash, value.clone());
+            let Graph { store, update, .. } = &mut self.graph;
+            let old = Arc::make_mut(&mut store.observed).insert(*hash, value.clone());
+            update.note(Entry::Observed(*hash, old));
             if let Some(n) = nodes.get(hash) {
-                self.graph.save(*n);
-                self.graph.nodes[*n as usize].flags |= TARGET;
-                self.graph.invalidate_target(&self.code, *n);
+                update.save(store, *n);
+                store[*n].flags |= TARGET;
+                update.invalidate_target(store, &self.code, *n);
             }
         }
     }
@@ -187,7 +178,7 @@ impl Trace {
     /// changes whenever they do, so that holders can detect a change by pointer.
     #[doc(hidden)]
     pub fn replacements(&self) -> &Arc<Observed> {
-        &self.graph.observed
+        &self.graph.store.observed
     }
 
     /// Observes the same values as another trace of the same program.
@@ -196,132 +187,16 @@ impl Trace {
     /// As [`Trace::set_observed`].
     #[doc(hidden)]
     pub fn observe_as(&mut self, other: &Trace) -> TraceResult<()> {
-        if Arc::ptr_eq(&self.graph.observed, &other.graph.observed) {
+        if Arc::ptr_eq(&self.graph.store.observed, &other.graph.store.observed) {
             return Ok(());
         }
         let mut values: Vec<_> =
-            other.graph.observed.iter().map(|(hash, v)| (*hash, v.clone())).collect();
+            other.graph.store.observed.iter().map(|(hash, v)| (*hash, v.clone())).collect();
         values.sort_by_key(|(hash, _)| *hash);
         self.set_observed(&values)?;
         self.commit();
-        self.graph.observed = Arc::clone(&other.graph.observed);
+        self.graph.store.observed = Arc::clone(&other.graph.store.observed);
         Ok(())
-    }
-}
-
-impl Graph {
-    fn put_observed(&mut self, hash: u64, value: Value) {
-        let old = Arc::make_mut(&mut self.observed).insert(hash, value);
-        self.note(Entry::Observed(hash, old));
-    }
-
-    /// Undoes [`Graph::put_observed`].
-    pub(super) fn undo_observed(&mut self, hash: u64, old: Option<Value>) {
-        let all = Arc::make_mut(&mut self.observed);
-        match old {
-            Some(v) => all.insert(hash, v),
-            None => all.remove(&hash),
-        };
-    }
-
-    /// Returns the value that replaces an observation's value in the program, if any.
-    pub(crate) fn replaced(&self, code: &Code, n: NodeId) -> Option<&Value> {
-        if self.observed.is_empty() {
-            return None;
-        }
-        let Op::Observe { site, .. } = self.op(code, n) else { return None };
-        self.observed.get(&self.site_hash(code, self.nodes[n as usize].frame, *site))
-    }
-
-    /// Returns the value of an observation; nodes read for it are added to `deps`.
-    pub(crate) fn observed_value<'a>(
-        &'a self,
-        code: &'a Code,
-        n: NodeId,
-        value: Operand,
-        deps: &mut Deps,
-    ) -> &'a Value {
-        match self.replaced(code, n) {
-            Some(v) => v,
-            None => self.plain(code, self.nodes[n as usize].frame, value, deps),
-        }
-    }
-
-    /// Returns a message if the observed value is outside the support of its distribution
-    /// under the current parameters, so that its probability is zero.
-    pub(super) fn outside_support(&self, code: &Code, n: NodeId) -> Option<String> {
-        let Op::Observe { dist: spec, value, .. } = self.op(code, n) else { return None };
-        let (mut deps, frame) = (Deps::new(), self.nodes[n as usize].frame);
-        let observed = self.observed_value(code, n, *value, &mut deps);
-        if let DistSpec::Value(o) = spec
-            && !matches!(self.value(code, frame, *o), Value::Dist(_))
-        {
-            return None;
-        }
-        let dist = self.make_dist(code, n, frame, spec, &mut deps).ok()?;
-        let count =
-            dist.elements().or_else(|| observed.len().filter(|_| is_repeated(&dist, observed)));
-        let Some(count) = count else { return outside(&dist, observed) };
-        (0..count).find_map(|i| outside(&dist.element(i), &observed.element(i)?))
-    }
-
-    /// Samples an observation, or describes why it cannot be sampled.
-    fn draw_observed(
-        &self,
-        code: &Code,
-        n: NodeId,
-        rng: &mut Stream,
-    ) -> Result<Result<Value, String>, Failure> {
-        let frame = self.nodes[n as usize].frame;
-        let Op::Observe { dist: spec, value, .. } = self.op(code, n) else {
-            return Ok(Err("a factor".into()));
-        };
-        let mut deps = Deps::new();
-        let observed = self.observed_value(code, n, *value, &mut deps);
-        if let DistSpec::Value(o) = spec
-            && let Value::Likelihood(l) = self.value(code, frame, *o)
-        {
-            return match l.sample(observed, rng) {
-                Some(drawn) => drawn.map(Ok).map_err(|f| self.fault(code, n, f)),
-                None => Ok(Err(format!("the likelihood `{}`", l.name()))),
-            };
-        }
-        let dist = self.make_dist(code, n, frame, spec, &mut deps)?;
-        if dist.is_improper() {
-            return Ok(Err(format!("the improper distribution `{}`", dist.name())));
-        }
-        Ok(Ok(sample_like(&dist, observed, rng)))
-    }
-}
-
-/// Returns a message if a value is outside the support of a distribution.
-fn outside(dist: &Dist, observed: &Value) -> Option<String> {
-    let x = observed.to_datum()?;
-    let support = dist.support();
-    let is_truth = support == Support::Boolean && matches!(x, Datum::Num(0.0 | 1.0));
-    let apart = || {
-        format!(
-            "the observed value {observed} is outside the support of `{}` ({support})",
-            dist.name()
-        )
-    };
-    (!is_truth && !support.contains(&x)).then(apart)
-}
-
-/// Samples in the form in which a value is scored: element by element if the distribution
-/// is over less than the whole value.
-fn sample_like(dist: &Dist, observed: &Value, rng: &mut Stream) -> Value {
-    let mut one = |d: &Dist| Value::from_datum(&d.sample(rng));
-    if let Some(count) = dist.elements() {
-        return Value::from_elements((0..count).map(|i| one(&dist.element(i))).collect());
-    }
-    match observed {
-        Value::Array(xs) if is_repeated(dist, observed) => {
-            Value::from_elements(xs.iter().map(|_| one(dist)).collect())
-        }
-        Value::List(_) if observed.to_datum().is_some_and(|x| dist.support().fits(&x)) => one(dist),
-        Value::List(xs) => Value::from_elements(xs.iter().map(|_| one(dist)).collect()),
-        _ => one(dist),
     }
 }
 

@@ -9,7 +9,6 @@
 
 use super::node::NodeId;
 use super::{Address, Change, Constraint, Draws, Selector, Target, Trace, TraceResult, Weight};
-use crate::lang::code::Op;
 use crate::lang::error::{FaultKind, RunError};
 use crate::lang::value::Value;
 use pcadlang_numerics::dist::Datum;
@@ -113,13 +112,13 @@ impl Trace {
             self.propose_observed(&sorted.changes, &sorted.constraints, &sorted.observed, draws);
         let mut weight = proposed.map_err(|e| self.misfit_behind(given, e))?;
         let late = self.appeared_observations(given, &sorted);
-        let removed = self.graph.removed.clone();
+        let removed = self.graph.update.removed.clone();
         if !removed.is_empty() || !late.is_empty() {
             // Addresses may contain values that have changed, so they are spelt in the
             // previous state.
             self.rollback();
             for (n, _, stored) in removed {
-                let address = self.graph.address(&self.code, n);
+                let address = self.graph.address(n);
                 if !sorted.discarded.iter().any(|(a, _)| *a == address) {
                     sorted.discarded.push((address, Given::Stored(stored)));
                 }
@@ -145,13 +144,13 @@ impl Trace {
     /// it equals the log joint bit for bit. Observations have addresses and tags but no
     /// kinds.
     pub fn project(&self, selector: &Selector) -> f64 {
-        let (g, code) = (&self.graph, &*self.code);
+        let g = &self.graph;
         let mut sum = ExactSum::default();
-        for t in self.all_targets().iter().filter(|t| g.selects(code, selector, t)) {
+        for t in self.all_targets().iter().filter(|t| g.selects(selector, t)) {
             sum.add(self.score_of(*t));
         }
         for n in self.scored_nodes() {
-            if selector.selects(&g.facts(code, n, selector.needs_address(), None)) {
+            if selector.selects(&g.facts(n, selector.needs_address(), None)) {
                 g.put_score(n, &mut sum);
             }
         }
@@ -164,7 +163,7 @@ impl Trace {
         let (g, none) = (&self.graph, ExactSum::default());
         let Some(before) = &self.update else { return 0.0 };
         ExactSum::difference_of_sums(
-            [&g.prior, &g.likelihood, &g.drawn],
+            [&g.score.prior, &g.score.likelihood, &g.score.drawn],
             [&before.prior, &before.likelihood, &none],
         )
     }
@@ -257,18 +256,14 @@ impl Trace {
 
     /// Returns the observed value at an address.
     fn observed_at(&self, address: &Address, nodes: &FxHashMap<u64, NodeId>) -> Option<Value> {
-        let n = *nodes.get(&address.hash64())?;
-        let Op::Observe { value, .. } = self.graph.op(&self.code, n) else { return None };
-        Some(
-            self.graph.observed_value(&self.code, n, *value, &mut super::node::Deps::new()).clone(),
-        )
+        Some(self.graph.observed_value(*nodes.get(&address.hash64())?).clone())
     }
 
     fn unknown(&self, address: &Address) -> Box<RunError> {
-        let (g, code) = (&self.graph, &*self.code);
+        let g = &self.graph;
         let mut known: Vec<String> =
             self.all_targets().iter().map(|t| self.address(*t).to_string()).collect();
-        known.extend(self.observation_nodes().values().map(|n| g.address(code, *n).to_string()));
+        known.extend(self.observation_nodes().values().map(|n| g.address(*n).to_string()));
         known.sort();
         let text = address.to_string();
         let near = pcadlang_syntax::diag::nearest(&text, known.iter().map(String::as_str));

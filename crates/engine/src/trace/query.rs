@@ -2,7 +2,7 @@
 //! surrogates of observations. Choices drawn for a query are discarded afterwards.
 
 use super::graph::Graph;
-use super::node::{Arguments, Deps, Frame, FrameId, State};
+use super::node::{Arguments, Frame, FrameId, State};
 use super::{Address, Draws, Trace, TraceResult};
 use crate::lang::code::{BlockId, Code, Operand};
 use crate::lang::value::Value;
@@ -17,13 +17,17 @@ impl Trace {
     /// If their evaluation fails.
     #[doc(hidden)]
     pub fn query(&mut self, operands: &[Operand], draws: Draws) -> TraceResult<Vec<Value>> {
-        self.asked(|graph, code| graph.query(code, 0, operands), draws, |_, values| Ok(values))
+        self.asked(
+            |graph, code| graph.query(code, FrameId::ROOT, operands),
+            draws,
+            |_, values| Ok(values),
+        )
     }
 
     /// Returns the value of a top-level expression, if the state has it.
     #[doc(hidden)]
     pub fn evaluated(&self, operand: Operand) -> Option<&Value> {
-        let node = &self.graph.nodes[self.graph.resolve(0, operand)? as usize];
+        let node = &self.graph.store[self.graph.resolve(FrameId::ROOT, operand)?];
         (node.state == State::Clean).then_some(&node.value)
     }
 
@@ -38,11 +42,11 @@ impl Trace {
         draws: Draws,
     ) -> TraceResult<Value> {
         let args = Arguments::Supplied(args);
-        let root = self.graph.frames[0].clone();
-        let frame = Frame { block: function, parent: 0, depth: 1, args, ..root };
+        let root = self.graph.store[FrameId::ROOT].clone();
+        let frame = Frame { block: function, parent: FrameId::ROOT, depth: 1, args, ..root };
         let evaluate = |graph: &mut Graph, code: &Code| {
-            let frame = graph.make_frame(code, frame)?;
-            graph.query(code, frame, code.blocks[function as usize].result.as_slice())
+            let frame = graph.make_frame(frame)?;
+            graph.query(code, frame, code.blocks[function].result.as_slice())
         };
         self.asked(evaluate, draws, |_, mut values| Ok(values.pop().unwrap_or_default()))
     }
@@ -60,10 +64,11 @@ impl Trace {
         look: impl FnOnce(&Trace, Vec<Value>) -> T,
     ) -> TraceResult<T> {
         self.asked(
-            |graph, code| graph.query(code, 0, operands),
+            |graph, code| graph.query(code, FrameId::ROOT, operands),
             draws,
             |trace, values| {
-                trace.graph.update_selections(&trace.code)?;
+                let Graph { choices, store, update, .. } = &mut trace.graph;
+                choices.update_selections(store, update)?;
                 Ok(look(trace, values))
             },
         )
@@ -78,12 +83,12 @@ impl Trace {
     ) -> TraceResult<T> {
         self.rollback();
         let before = self.graph.begin();
-        self.graph.draws = draws;
-        self.graph.before = Some(before.clone());
+        self.graph.update.draws = draws;
+        self.graph.score.before = Some(before.clone());
         let result = evaluate(&mut self.graph, &self.code);
-        self.graph.before = None;
+        self.graph.score.before = None;
         let result = result.and_then(|values| used(self, values));
-        self.graph.rollback(&self.code, before);
+        self.graph.rollback(before);
         result
     }
 
@@ -106,38 +111,15 @@ impl Trace {
     #[doc(hidden)]
     pub fn surrogate(&mut self, address: &Address, draws: Draws) -> TraceResult<Option<f64>> {
         let Some((n, _)) =
-            self.scored().into_iter().find(|(n, _)| self.graph.address(&self.code, *n) == *address)
+            self.scored().into_iter().find(|(n, _)| self.graph.address(*n) == *address)
         else {
             return Ok(None);
         };
         self.rollback();
         let before = self.graph.begin();
-        self.graph.draws = draws;
+        self.graph.update.draws = draws;
         let result = self.graph.surrogate_score(&self.code, n);
-        self.graph.rollback(&self.code, before);
+        self.graph.rollback(before);
         result
-    }
-}
-
-impl Graph {
-    pub(super) fn query(
-        &mut self,
-        code: &Code,
-        frame: FrameId,
-        operands: &[Operand],
-    ) -> TraceResult<Vec<Value>> {
-        let mut values = Vec::with_capacity(operands.len());
-        for o in operands {
-            if let Some(n) = self.resolve(frame, *o) {
-                self.evaluate(code, n)?;
-            }
-            if let Value::Container(r) = self.value(code, frame, *o) {
-                let gather = r.node + 1;
-                self.evaluate(code, gather)?;
-            }
-            let mut deps = Deps::new();
-            values.push(self.plain(code, frame, *o, &mut deps).clone());
-        }
-        Ok(values)
     }
 }

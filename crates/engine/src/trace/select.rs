@@ -70,7 +70,7 @@ pub enum PatternSegment {
 /// Facts about a choice when it is registered, or about an observation for `project`.
 #[derive(Clone, Debug)]
 pub(crate) struct Facts {
-    /// Whether it is a choice; kinds apply to choices only.
+    /// True if it is a choice; kinds apply to choices only.
     pub choice: bool,
     pub address: Address,
     pub tags: Vec<(Arc<str>, Option<Key>)>,
@@ -90,7 +90,7 @@ impl Pattern {
         Pattern { segments: address.segments.iter().map(segment).collect() }
     }
 
-    /// Whether it can match an address whose last segments have these names: its last
+    /// True if it can match an address whose last segments have these names: its last
     /// names occur among them, in order.
     fn may_match(&self, last: &[&str]) -> bool {
         let fits = |rest: &[PatternSegment]| {
@@ -105,7 +105,7 @@ impl Pattern {
         (0..self.segments.len()).any(|i| fits(&self.segments[i..]))
     }
 
-    /// Whether an address is selected: it matches, or is below one that matches.
+    /// True if an address is selected: it matches, or is below one that matches.
     pub fn matches(&self, address: &Address) -> bool {
         matches(&self.segments, &address.segments)
     }
@@ -131,7 +131,7 @@ fn matches(pattern: &[PatternSegment], address: &[AddressSegment]) -> bool {
 }
 
 impl Selector {
-    /// Whether it selects this address by address patterns alone; kinds and tags select
+    /// True if it selects this address by address patterns alone; kinds and tags select
     /// nothing.
     pub(crate) fn names(&self, address: &Address) -> bool {
         match self {
@@ -144,7 +144,7 @@ impl Selector {
         }
     }
 
-    /// Whether its address patterns may select an address whose last segments have these
+    /// True if its address patterns may select an address whose last segments have these
     /// names, with any keys.
     pub(crate) fn may_name(&self, last: &[&str]) -> bool {
         match self {
@@ -157,7 +157,7 @@ impl Selector {
         }
     }
 
-    /// Whether the address is needed to decide.
+    /// True if the address is needed to decide.
     pub(crate) fn needs_address(&self) -> bool {
         match self {
             Selector::Address(_) => true,

@@ -3,7 +3,7 @@
 
 use super::propose::{Change, Constraint, Draws, Weight};
 use super::{Selector, Target, Trace, TraceResult};
-use crate::lang::code::Op;
+use crate::lang::code::{Op, OpId};
 use rustc_hash::FxHashMap;
 use std::cmp::Ordering;
 use std::sync::Arc;
@@ -17,14 +17,13 @@ impl Trace {
     /// # Errors
     /// If the evaluation of the surrogates fails.
     pub fn under_surrogates(&self, at: &Selector) -> TraceResult<Option<Trace>> {
-        let mut present: FxHashMap<u32, bool> = FxHashMap::default();
+        let mut present: FxHashMap<OpId, bool> = FxHashMap::default();
         for n in self.scored_nodes() {
-            *present.entry(self.graph.nodes[n as usize].op).or_default() |=
-                at.names(&self.graph.address(&self.code, n));
+            *present.entry(self.graph.store[n].op).or_default() |= at.names(&self.graph.address(n));
         }
-        let named = |op: &u32| match &self.code.ops[*op as usize] {
+        let named = |op: &OpId| match &self.code.ops[*op] {
             Op::Observe { coarse: Some(_), site, .. } => {
-                let segments = self.code.sites[*site as usize].segments.iter().map(|s| &*s.name);
+                let segments = self.code.sites[*site].segments.iter().map(|s| &*s.name);
                 present
                     .get(op)
                     .copied()
@@ -32,15 +31,19 @@ impl Trace {
             }
             _ => false,
         };
-        let ops: Vec<u32> = (0..self.code.ops.len() as u32).filter(named).collect();
+        let ops: Vec<OpId> = (0..self.code.ops.len()).map(OpId::new).filter(named).collect();
         if ops.is_empty() {
             return Ok(None);
         }
         let code = Arc::new(self.present_code().with_surrogates(&ops));
-        let (mut surrogate, _) =
-            Trace::generate(code, self.constraints(), Draws::default(), self.graph.limits.clone())?;
-        surrogate.graph.observed = Arc::clone(&self.graph.observed);
-        surrogate.graph.incremental = self.graph.incremental;
+        let (mut surrogate, _) = Trace::generate(
+            code,
+            self.constraints(),
+            Draws::default(),
+            self.graph.budget.limits.clone(),
+        )?;
+        surrogate.graph.store.observed = Arc::clone(&self.graph.store.observed);
+        surrogate.graph.store.incremental = self.graph.incremental;
         Ok(Some(surrogate))
     }
 
@@ -68,16 +71,16 @@ impl Trace {
         let mut own = Vec::new();
         pairs(self, other, |here, there| {
             if let (Some(t), None) = (here, there) {
-                own.push(self.graph.choice_hash(&self.code, t.node));
+                own.push(self.graph.choice_hash(t.node));
             }
         });
         own
     }
 
-    /// Whether the pending proposal removes a choice at one of these addresses, even if
+    /// True if the pending proposal removes a choice at one of these addresses, even if
     /// another one replaces it.
     pub fn takes_away(&self, addresses: &[u64]) -> bool {
-        self.graph.removed.iter().any(|(_, hash, _)| addresses.contains(hash))
+        self.graph.update.removed.iter().any(|(_, hash, _)| addresses.contains(hash))
     }
 
     /// Returns the first choice of another trace that this one does not have.

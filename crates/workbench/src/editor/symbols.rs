@@ -7,7 +7,7 @@ use super::words::start_of;
 use pcadlang_engine::lang::address::AddressSegment;
 use pcadlang_engine::lang::builtins::Kind;
 use pcadlang_engine::lang::builtins::doc::doc;
-use pcadlang_engine::lang::code::{BlockKind, Code, DistSpec, Op, Operand};
+use pcadlang_engine::lang::code::{Block, BlockKind, Code, DistSpec, Op, Operand, SiteId};
 use pcadlang_numerics::dist::FAMILIES;
 use pcadlang_syntax::span::{FileId, Span};
 use pcadlang_syntax::{Class, classes};
@@ -131,17 +131,17 @@ impl Analysis {
         let Some(model) = &self.model else { return Vec::new() };
         let code = model.code();
         let mut all = Vec::new();
-        for (i, block) in code.blocks.iter().enumerate() {
-            for (slot, span) in block.spans.iter().enumerate() {
-                let op = code.ops.get(block.first as usize + slot);
-                let Some(Op::Draw { dist, site, .. }) = op else { continue };
+        for block in &code.blocks {
+            for (slot, span) in block.slots().zip(&block.spans) {
+                let op = &code.ops[block.first + slot];
+                let Op::Draw { dist, site, .. } = op else { continue };
                 if span.file != FileId(0) {
                     continue;
                 }
                 all.push(Hint {
                     at: span.end,
-                    address: address(code, i, *site),
-                    support: support(code, i, dist).unwrap_or_default(),
+                    address: address(code, block, *site),
+                    support: support(code, block, dist).unwrap_or_default(),
                 });
             }
         }
@@ -150,17 +150,17 @@ impl Analysis {
     }
 }
 
-fn address(code: &Code, block: usize, site: u32) -> String {
+fn address(code: &Code, block: &Block, site: SiteId) -> String {
     let (mut inside, mut looped, mut at) = (false, false, Some(block));
-    while let Some(block) = at.and_then(|i| code.blocks.get(i)) {
+    while let Some(block) = at {
         match block.kind {
             BlockKind::Function { .. } => inside = true,
             BlockKind::Loop => looped |= !inside,
             _ => {}
         }
-        at = block.parent.map(|p| p as usize);
+        at = block.parent.map(|p| &code.blocks[p]);
     }
-    let segments: Vec<String> = code.sites[site as usize]
+    let segments: Vec<String> = code.sites[site]
         .segments
         .iter()
         .map(|s| AddressSegment {
@@ -174,15 +174,13 @@ fn address(code: &Code, block: usize, site: u32) -> String {
     format!("@{before}{}{keys}", segments.join("/"))
 }
 
-fn support(code: &Code, block: usize, dist: &DistSpec) -> Option<String> {
+fn support(code: &Code, block: &Block, dist: &DistSpec) -> Option<String> {
     let builtin = match dist {
         DistSpec::Family { builtin, .. } => *builtin,
-        DistSpec::Value(Operand::Local(slot)) => {
-            match code.ops.get(code.blocks[block].first as usize + *slot as usize)? {
-                Op::Prim { builtin, .. } => *builtin,
-                _ => return None,
-            }
-        }
+        DistSpec::Value(Operand::Local(slot)) => match &code.ops[block.first + *slot] {
+            Op::Prim { builtin, .. } => *builtin,
+            _ => return None,
+        },
         DistSpec::Value(_) => return None,
     };
     let family = code.builtins.get(builtin);

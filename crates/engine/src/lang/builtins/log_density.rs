@@ -47,7 +47,7 @@ fn dist<'a>(a: &Args<'a>) -> Result<&'a Dist, Fault> {
     }
 }
 
-/// Whether a value is in the space of a distribution, or an array of such values.
+/// True if a value is in the space of a distribution, or an array of such values.
 fn fits(d: &Dist, x: &Value) -> bool {
     let one = |d: &Dist, x: &Value| x.to_datum().is_some_and(|x| d.support().fits(&x));
     match (d.elements(), x) {

@@ -4,8 +4,9 @@
 //! operation on the way creates structure (calls, branches with frames, loops), the slots
 //! that depend on the choice are the same in every state.
 
-use super::op::{DistSpec, Op, Slot};
+use super::op::{DistSpec, Op};
 use super::slots::SlotFacts;
+use crate::lang::ids::Slot;
 
 /// The maximum number of these slots.
 const MOST: usize = 64;
@@ -29,15 +30,15 @@ fn visit(
     reached: &mut [bool],
     order: &mut Vec<Slot>,
 ) -> Option<()> {
-    reached[slot as usize] = true;
-    if slots[slot as usize].is_result {
+    reached[slot] = true;
+    if slots[slot].is_result {
         return None;
     }
-    for user in &slots[slot as usize].users {
-        if reached[*user as usize] {
+    for user in &slots[slot].users {
+        if reached[*user] {
             continue;
         }
-        match &ops[*user as usize] {
+        match &ops[*user] {
             Op::Prim { .. }
             | Op::Array(_)
             | Op::Record { .. }
@@ -46,13 +47,13 @@ fn visit(
                 visit(ops, slots, *user, reached, order)?;
             }
             Op::Observe { coarse: None, .. } | Op::Factor { .. } => {
-                reached[*user as usize] = true;
+                reached[*user] = true;
                 order.push(*user);
             }
             // A choice keeps its value when its parameters change, unless its form
             // requires otherwise; that is checked at run time.
             Op::Draw { dist: DistSpec::Family { .. }, .. } => {
-                reached[*user as usize] = true;
+                reached[*user] = true;
                 order.push(*user);
             }
             _ => return None,

@@ -1,9 +1,10 @@
 //! The facts about slots, derived from the operations of a whole program.
 
-use super::op::{Callee, Op, Operand, Slot};
+use super::op::{Callee, Op, Operand};
 use super::program::{Block, Code, Eager};
 use super::slots::SlotFacts;
 use super::{dependents::dependents, flatten};
+use crate::lang::ids::OpId;
 use crate::lang::local_density::LocalDensity;
 use crate::lang::value::Value;
 
@@ -14,16 +15,15 @@ impl Code {
         flatten::flatten(self);
         let effects = self.effects();
         for (block, is_effect) in self.blocks.iter_mut().zip(effects) {
-            block.effects =
-                (0..block.ops.len() as Slot).filter(|s| is_effect[*s as usize]).collect();
-            block.first = self.ops.len() as u32;
+            block.effects = block.slots().filter(|s| is_effect[*s]).collect();
+            block.first = OpId::new(self.ops.len());
             let mut users = vec![Vec::new(); block.ops.len()];
-            for (slot, op) in block.ops.iter().enumerate() {
+            for (slot, op) in block.slots().zip(&block.ops) {
                 let mut uses = |o| {
                     if let Operand::Local(s) = o
-                        && users[s as usize].last() != Some(&(slot as Slot))
+                        && users[s].last() != Some(&slot)
                     {
-                        users[s as usize].push(slot as Slot);
+                        users[s].push(slot);
                     }
                 };
                 op.operands(&mut uses);
@@ -32,15 +32,15 @@ impl Code {
                     uses(*otherwise);
                 }
                 if matches!(op, Op::Gather) {
-                    users[slot - 1].push(slot as Slot);
+                    users[slot.index() - 1].push(slot);
                 }
             }
-            for (slot, (op, users)) in block.ops.drain(..).zip(users).enumerate() {
+            for (slot, (op, users)) in block.slots().zip(block.ops.drain(..).zip(users)) {
                 self.slots.push(SlotFacts {
-                    slot: slot as Slot,
+                    slot,
                     is_effect: is_effect[slot],
                     is_draw: matches!(op, Op::Draw { .. }),
-                    is_result: block.result == Some(Operand::Local(slot as Slot)),
+                    is_result: block.result == Some(Operand::Local(slot)),
                     reads: op.reads(),
                     users: users.into(),
                     local_density: None,
@@ -48,16 +48,17 @@ impl Code {
                 self.ops.push(op);
             }
             let (ops, slots) =
-                (&self.ops[block.first as usize..], &self.slots[block.first as usize..]);
-            let found: Vec<_> = (0..slots.len() as Slot)
-                .filter(|s| matches!(ops[*s as usize], Op::Draw { .. } | Op::Index { .. }))
+                (&self.ops[block.first.index()..], &self.slots[block.first.index()..]);
+            let found: Vec<_> = block
+                .slots()
+                .filter(|s| matches!(ops[*s], Op::Draw { .. } | Op::Index { .. }))
                 .filter_map(|s| {
                     let dependents = dependents(ops, slots, s)?;
                     Some((s, LocalDensity::new(ops, dependents, s, &self.builtins).map(Box::new)))
                 })
                 .collect();
             for (slot, local_density) in found {
-                self.slots[block.first as usize + slot as usize].local_density = local_density;
+                self.slots[block.first + slot].local_density = local_density;
             }
         }
     }
@@ -76,8 +77,8 @@ impl Code {
             let Operand::Local(slot) = *o else { continue };
             // For a container, all elements: they are gathered in the slot that follows
             // it.
-            let is_container = matches!(self.blocks[0].ops[slot as usize], Op::Container { .. });
-            effects[0][slot as usize + usize::from(is_container)] = true;
+            let is_container = matches!(self.blocks[0].ops[slot], Op::Container { .. });
+            effects[0][slot.index() + usize::from(is_container)] = true;
         }
         effects
     }
@@ -101,10 +102,10 @@ impl Code {
                 }
             }
             let escaped = self.blocks.iter().flat_map(|b| &b.ops).any(|op| match op {
-                Op::Closure(block) => observes[*block as usize],
+                Op::Closure(block) => observes[*block],
                 _ => false,
             }) || self.consts.iter().any(|c| match c {
-                Value::Closure(c) => observes[c.block as usize],
+                Value::Closure(c) => observes[c.block],
                 _ => false,
             });
             if escaped && !escaped_observes {
@@ -125,9 +126,9 @@ impl Code {
 fn op_observes(op: &Op, observes: &[bool], escaped: bool) -> bool {
     match op {
         Op::Observe { .. } | Op::Factor { .. } => true,
-        Op::If { then, otherwise, .. } => observes[*then as usize] || observes[*otherwise as usize],
-        Op::For { body, .. } => observes[*body as usize],
-        Op::Call { callee: Callee::Static(b), .. } => observes[*b as usize],
+        Op::If { then, otherwise, .. } => observes[*then] || observes[*otherwise],
+        Op::For { body, .. } => observes[*body],
+        Op::Call { callee: Callee::Static(b), .. } => observes[*b],
         Op::Call { callee: Callee::Value(_), .. } | Op::Map { .. } | Op::Fold { .. } => escaped,
         _ => false,
     }

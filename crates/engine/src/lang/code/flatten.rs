@@ -6,8 +6,9 @@
 //! two results. Evaluation is on demand, so the other branch is still not run, and
 //! choices that only it reads are not drawn.
 
-use super::op::{Op, Operand, Slot};
+use super::op::{Op, Operand};
 use super::program::{Block, BlockKind, Code};
+use crate::lang::ids::{BlockId, Slot};
 use crate::lang::value::Value;
 
 /// Flattens every block, inner ones first.
@@ -16,13 +17,11 @@ pub(super) fn flatten(code: &mut Code) {
     for b in (0..code.blocks.len()).rev() {
         for slot in 0..code.blocks[b].ops.len() {
             let Op::If { cond, then, otherwise } = code.blocks[b].ops[slot] else { continue };
-            if !only_computes(&code.blocks[then as usize])
-                || !only_computes(&code.blocks[otherwise as usize])
-            {
+            if !only_computes(&code.blocks[then]) || !only_computes(&code.blocks[otherwise]) {
                 continue;
             }
-            let then = splice(code, b, then as usize, nothing);
-            let otherwise = splice(code, b, otherwise as usize, nothing);
+            let then = splice(code, b, then, nothing);
+            let otherwise = splice(code, b, otherwise, nothing);
             code.blocks[b].ops[slot] = Op::Select { cond, then, otherwise };
         }
     }
@@ -44,16 +43,16 @@ fn only_computes(block: &Block) -> bool {
 
 /// Moves the operations of a branch to the end of the block around it, and returns its
 /// result as an operand of that block.
-fn splice(code: &mut Code, into: usize, branch: usize, nothing: Operand) -> Operand {
+fn splice(code: &mut Code, into: usize, branch: BlockId, nothing: Operand) -> Operand {
     let (ops, spans) = (
         std::mem::take(&mut code.blocks[branch].ops),
         std::mem::take(&mut code.blocks[branch].spans),
     );
-    let first = code.blocks[into].ops.len() as Slot;
+    let first = code.blocks[into].ops.len() as u32;
     let outwards = |o: &mut Operand| {
         *o = match *o {
             Operand::Const(i) => Operand::Const(i),
-            Operand::Local(s) => Operand::Local(first + s),
+            Operand::Local(s) => Operand::Local(Slot(first + s.0)),
             Operand::Outer { up: 1, slot } => Operand::Local(slot),
             Operand::Outer { up, slot } => Operand::Outer { up: up - 1, slot },
         };

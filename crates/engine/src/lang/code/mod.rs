@@ -14,6 +14,7 @@ mod program;
 mod slots;
 mod surrogate;
 
-pub use op::{BlockId, Callee, DistSpec, Op, Operand, Probe, Slot, Source, SourceKey};
+pub use super::ids::{BlockId, OpId, SiteId, Slot};
+pub use op::{Callee, DistSpec, ElementDraw, ElementKey, Op, Operand, Probe};
 pub use program::{Block, BlockKind, Code, Eager, Force, Observed, Site, SiteSegment, SiteTag};
 pub use slots::SlotFacts;

@@ -1,11 +1,7 @@
 //! The operations of lowered code, and where they find their inputs.
 
+use crate::lang::ids::{BlockId, SiteId, Slot};
 use std::sync::Arc;
-
-/// The index of a block in [`Code::blocks`](super::Code::blocks).
-pub type BlockId = u32;
-/// The index of a slot in a block.
-pub type Slot = u32;
 
 /// Where an operation finds an input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -58,20 +54,20 @@ pub enum Callee {
 
 /// A draw whose choices are elements of a keyed container.
 #[derive(Clone, Debug)]
-pub struct Source {
+pub struct ElementDraw {
     /// The `for` operations that lead to the draw, outermost first: a slot of the
     /// container's block, then of each body.
     pub loops: Box<[Slot]>,
     /// The draw, in the innermost body (or the container's own block).
     pub draw: Slot,
     /// Its keys.
-    pub keys: Box<[SourceKey]>,
+    pub keys: Box<[ElementKey]>,
 }
 
 /// A key of a drawn element.
 #[derive(Clone, Copy, Debug)]
-pub enum SourceKey {
-    /// The variable of the enclosing loop, by index into [`Source::loops`].
+pub enum ElementKey {
+    /// The variable of the enclosing loop, by index into [`ElementDraw::loops`].
     Loop(u32),
     /// An operand of the draw's block.
     Operand(Operand),
@@ -132,7 +128,7 @@ pub enum Op {
         /// The arguments as written.
         args: Box<[(Option<Arc<str>>, Operand)]>,
         /// Its site, by index into [`Code::sites`](super::Code::sites).
-        site: u32,
+        site: SiteId,
     },
     /// `if c { … } else { … }`
     If {
@@ -170,7 +166,7 @@ pub enum Op {
         over: Operand,
         /// Its site; the element's key goes to its last segment but one, or to its only
         /// one.
-        site: u32,
+        site: SiteId,
     },
     /// `fold(f, init, xs)`
     Fold {
@@ -181,14 +177,14 @@ pub enum Op {
         /// The array or record that it iterates over.
         over: Operand,
         /// Its site, by index into [`Code::sites`](super::Code::sites).
-        site: u32,
+        site: SiteId,
     },
     /// A keyed container of random choices.
     Container {
         /// Its name.
         name: Arc<str>,
         /// The draws of its elements.
-        sources: Box<[Source]>,
+        sources: Box<[ElementDraw]>,
     },
     /// The array or record of all elements of the container in the preceding slot.
     Gather,
@@ -197,14 +193,14 @@ pub enum Op {
         /// The function.
         f: Operand,
         /// Its site, by index into [`Code::sites`](super::Code::sites).
-        site: u32,
+        site: SiteId,
     },
     /// A random choice.
     Draw {
         /// Its distribution.
         dist: DistSpec,
         /// Its site, by index into [`Code::sites`](super::Code::sites).
-        site: u32,
+        site: SiteId,
         /// The keys of `t[k] ~ d`.
         keys: Box<[Operand]>,
     },
@@ -218,14 +214,14 @@ pub enum Op {
         /// depends on.
         coarse: Option<Operand>,
         /// Its site, by index into [`Code::sites`](super::Code::sites).
-        site: u32,
+        site: SiteId,
     },
     /// A soft constraint.
     Factor {
         /// The log weight.
         weight: Operand,
         /// Its site, by index into [`Code::sites`](super::Code::sites).
-        site: u32,
+        site: SiteId,
     },
     /// A property of the whole trace; never cached.
     Probe(Probe),

@@ -1,9 +1,10 @@
 //! A lowered program: its blocks, and what their operations refer to by index.
 
-use super::op::{BlockId, Op, Operand, Slot};
+use super::op::{Op, Operand};
 use super::slots::SlotFacts;
 use crate::lang::address::segment_hash;
 use crate::lang::builtins::Table;
+use crate::lang::ids::{BlockId, OpId, Slot};
 use crate::lang::value::Value;
 use pcadlang_syntax::span::Span;
 use std::sync::Arc;
@@ -37,18 +38,18 @@ pub struct Code {
     pub samples: Vec<Operand>,
     /// `force @a = v;` statements, in order.
     pub forces: Vec<Force>,
-    /// Whether it has `freeze` statements.
+    /// True if it has `freeze` statements.
     pub has_freezes: bool,
     /// Expressions of reports and exports, by source span.
     pub queries: rustc_hash::FxHashMap<Span, Operand>,
     /// Observed values that replace those of the program, by the hash of the
     /// observation's address.
     pub observed: Arc<Observed>,
-    /// What runs even if nothing depends on it.
+    /// The slots that run even if nothing depends on them.
     pub eager: Eager,
 }
 
-/// What runs even if nothing depends on it.
+/// The slots that run even if nothing depends on them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Eager {
     /// Observations and factors: a choice that none of them depends on is not part of a
@@ -107,7 +108,7 @@ pub struct Block {
     /// [`Code::ops`].
     pub ops: Vec<Op>,
     /// The index of its first operation in [`Code::ops`].
-    pub first: u32,
+    pub first: OpId,
     /// The source span of each operation.
     pub spans: Vec<Span>,
     /// The value of the block.
@@ -168,7 +169,7 @@ impl Block {
             ops: Vec::new(),
             spans: Vec::new(),
             result: None,
-            first: 0,
+            first: OpId(0),
             effects: Vec::new(),
         }
     }
@@ -178,7 +179,12 @@ impl Block {
         self.spans.len()
     }
 
-    /// Whether it has no slots.
+    /// Iterates over its slots.
+    pub fn slots(&self) -> impl DoubleEndedIterator<Item = Slot> + use<> {
+        (0..self.len()).map(Slot::new)
+    }
+
+    /// True if it has no slots.
     pub fn is_empty(&self) -> bool {
         self.spans.is_empty()
     }
@@ -187,7 +193,7 @@ impl Block {
     pub fn push(&mut self, op: Op, span: Span) -> Slot {
         self.ops.push(op);
         self.spans.push(span);
-        self.ops.len() as Slot - 1
+        Slot::new(self.ops.len() - 1)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Static facts about the slots of lowered code that updates need: which slots read a
 //! slot, what it reads, whether it is an effect, and the local density of a choice.
 
-use super::op::Slot;
+use crate::lang::ids::Slot;
 use crate::lang::local_density::LocalDensity;
 
 /// Static facts about a slot.
@@ -9,11 +9,11 @@ use crate::lang::local_density::LocalDensity;
 pub struct SlotFacts {
     /// The slot.
     pub slot: Slot,
-    /// Whether it runs even if nothing depends on it.
+    /// True if it runs even if nothing depends on it.
     pub is_effect: bool,
-    /// Whether it is a random choice.
+    /// True if it is a random choice.
     pub is_draw: bool,
-    /// Whether it is the result of its block.
+    /// True if it is the result of its block.
     pub is_result: bool,
     /// The slots it reads whenever it is evaluated: the number of levels out, and the
     /// slot there; `None` if they depend on the state.

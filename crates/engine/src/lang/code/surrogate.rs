@@ -4,21 +4,24 @@
 use super::op::{DistSpec, Op, Operand};
 use super::program::Code;
 use super::slots::SlotFacts;
+use crate::lang::ids::OpId;
 
 impl Code {
     /// Returns the program with these observations, given as indices of operations,
     /// replaced by their surrogates.
     #[must_use]
-    pub fn with_surrogates(&self, observations: &[u32]) -> Code {
+    pub fn with_surrogates(&self, observations: &[OpId]) -> Code {
         let mut code = self.clone();
-        for i in observations.iter().map(|i| *i as usize) {
-            let Some(Op::Observe { dist, coarse, .. }) = code.ops.get_mut(i) else { continue };
+        for i in observations.iter().copied() {
+            let Some(Op::Observe { dist, coarse, .. }) = code.ops.get_mut(i.index()) else {
+                continue;
+            };
             let Some(surrogate) = coarse.take() else { continue };
             *dist = DistSpec::Value(surrogate);
             let slot = code.slots[i].slot;
             code.slots[i].reads = code.ops[i].reads();
             if let Operand::Local(read) = surrogate {
-                let users = &mut code.slots[i - slot as usize + read as usize].users;
+                let users = &mut code.slots[i - slot + read].users;
                 if !users.contains(&slot) {
                     *users = users.iter().copied().chain([slot]).collect();
                 }

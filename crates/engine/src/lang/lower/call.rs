@@ -6,7 +6,7 @@ use super::scope::Meaning;
 use super::types::{accepts, shown};
 use crate::lang::builtins::data::Literal;
 use crate::lang::builtins::{Args, Builtin, Domain, Form, Kind, Type};
-use crate::lang::code::{BlockKind, Callee, Op, Operand, Probe};
+use crate::lang::code::{BlockId, BlockKind, Callee, Op, Operand, Probe};
 use crate::lang::fault::Fault;
 use crate::lang::value::Value;
 use pcadlang_syntax::ast::{Arg, Expr, ExprKind};
@@ -14,10 +14,10 @@ use pcadlang_syntax::span::Span;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
-/// What a called expression refers to.
+/// The referent of a called expression.
 enum Target {
     Builtin(u32),
-    Function(u32),
+    Function(BlockId),
     Value,
     Failed,
 }
@@ -332,9 +332,13 @@ impl Lowerer<'_> {
     }
 
     /// Checks the number and keywords of a named function's arguments.
-    fn check_arity(&mut self, block: u32, args: &[(Option<Arc<str>>, Typed, Span)], span: Span) {
-        let BlockKind::Function { name, params, required } = &self.code.blocks[block as usize].kind
-        else {
+    fn check_arity(
+        &mut self,
+        block: BlockId,
+        args: &[(Option<Arc<str>>, Typed, Span)],
+        span: Span,
+    ) {
+        let BlockKind::Function { name, params, required } = &self.code.blocks[block].kind else {
             return;
         };
         let (name, params, required) = (Arc::clone(name), Arc::clone(params), *required);

@@ -3,7 +3,7 @@
 use super::lowerer::{Lowerer, Typed};
 use super::scope::{Meaning, ScopeKind};
 use crate::lang::builtins::Type;
-use crate::lang::code::{DistSpec, Op, Operand, Slot, Source, SourceKey};
+use crate::lang::code::{BlockId, DistSpec, ElementDraw, ElementKey, Op, Operand, Slot};
 use crate::lang::value::Value;
 use pcadlang_numerics::dist::Drawn;
 use pcadlang_syntax::ast::{Expr, ExprKind, Name, Stmt, StmtKind, Tag};
@@ -36,16 +36,16 @@ impl Lowerer<'_> {
         }
     }
 
-    /// Whether a distribution is a multivariate normal that this block makes.
+    /// True if a distribution is a multivariate normal that this block makes.
     fn makes_arrays(&self, dist: Operand) -> bool {
         let Operand::Local(slot) = dist else { return false };
-        match self.code.blocks[self.block() as usize].ops.get(slot as usize) {
+        match self.code.blocks[self.block()].ops.get(slot.index()) {
             Some(Op::Prim { builtin, .. }) => self.has_covariance(*builtin),
             _ => false,
         }
     }
 
-    /// Whether a built-in is a family with a covariance matrix.
+    /// True if a built-in is a family with a covariance matrix.
     pub fn has_covariance(&self, builtin: u32) -> bool {
         self.code.builtins.get(builtin).drawn == Drawn::Correlated
     }
@@ -120,15 +120,13 @@ impl Lowerer<'_> {
             .iter()
             .zip(&operands)
             .map(|(k, o)| match loop_of(k) {
-                Some(i) if i >= skipped => SourceKey::Loop((i - skipped) as u32),
-                _ => SourceKey::Operand(*o),
+                Some(i) if i >= skipped => ElementKey::Loop((i - skipped) as u32),
+                _ => ElementKey::Operand(*o),
             })
             .collect();
-        let source = Source { loops: through, draw: slot, keys: source_keys };
+        let source = ElementDraw { loops: through, draw: slot, keys: source_keys };
         let home = self.scopes[outside].block;
-        if let Op::Container { sources, .. } =
-            &mut self.code.blocks[home as usize].ops[container as usize]
-        {
+        if let Op::Container { sources, .. } = &mut self.code.blocks[home].ops[container] {
             let mut all = std::mem::take(sources).into_vec();
             all.push(source);
             *sources = all.into();
@@ -150,7 +148,7 @@ impl Lowerer<'_> {
     /// Returns the occurrence of a container's name.
     /// `z[0] ~ d; for t in 1 .. n { z[t] ~ e; }` draws `@z[0]`, `@z[1]`, …; two elements
     /// with the same address are detected when they are drawn.
-    fn occurrence_of(&mut self, container: (u32, Slot), name: &Arc<str>) -> u32 {
+    fn occurrence_of(&mut self, container: (BlockId, Slot), name: &Arc<str>) -> u32 {
         if let Some(n) = self.bodies.last().and_then(|b| b.containers.get(&container)) {
             return *n;
         }
@@ -174,7 +172,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// Whether the innermost block is a loop, whose containers belong to a block further
+    /// True if the innermost block is a loop, whose containers belong to a block further
     /// out.
     fn in_loop(&self) -> bool {
         self.scopes.last().is_some_and(|s| matches!(s.kind, ScopeKind::Loop { .. }))

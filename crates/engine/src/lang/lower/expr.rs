@@ -4,7 +4,8 @@ use super::lowerer::{Lowerer, Typed};
 use super::scope::{Meaning, Scope, ScopeKind};
 use super::types::shown;
 use crate::lang::builtins::{Kind, Type};
-use crate::lang::code::{BlockKind, Op, Operand};
+use crate::lang::code::{BlockId, BlockKind, Op, Operand};
+use crate::lang::ids::FrameId;
 use crate::lang::index::index_value;
 use crate::lang::value::{Closure, Value};
 use pcadlang_syntax::ast::{BinaryOp, Body, Expr, ExprKind, Lambda, Name, UnaryOp};
@@ -106,7 +107,7 @@ impl Lowerer<'_> {
                     Typed { at: Self::reach(Operand::Local(slot), up), ty: Type::Any }
                 }
                 Meaning::Function(block) => {
-                    self.constant(Value::Closure(Closure { block, frame: 0 }))
+                    self.constant(Value::Closure(Closure { block, frame: FrameId::ROOT }))
                 }
             };
         }
@@ -278,7 +279,7 @@ impl Lowerer<'_> {
                     Typed { at: Self::reach(Operand::Local(slot), up), ty: Type::Any }
                 }
                 Meaning::Function(block) => {
-                    self.constant(Value::Closure(Closure { block, frame: 0 }))
+                    self.constant(Value::Closure(Closure { block, frame: FrameId::ROOT }))
                 }
             };
         }
@@ -388,14 +389,14 @@ impl Lowerer<'_> {
     }
 
     /// Lowers a branch into a separate block.
-    fn branch(&mut self, f: impl FnOnce(&mut Self) -> Option<Typed>) -> (u32, Type) {
+    fn branch(&mut self, f: impl FnOnce(&mut Self) -> Option<Typed>) -> (BlockId, Type) {
         let block = self.new_block(BlockKind::Branch);
         self.scopes.push(Scope::new(block, ScopeKind::Branch));
         let result = f(self);
         self.scopes.pop();
         // The result is an operand as seen from inside the branch, from where outer slots
         // are one level further out.
-        self.code.blocks[block as usize].result = result.map(|t| t.at);
+        self.code.blocks[block].result = result.map(|t| t.at);
         (block, result.map_or(Type::Any, |t| t.ty))
     }
 
@@ -406,7 +407,7 @@ impl Lowerer<'_> {
     }
 }
 
-/// Whether an operator may take an operand of this static type.
+/// True if an operator may take an operand of this static type.
 fn operand_fits(name: &str, ty: Type) -> bool {
     match (name, ty) {
         ("==" | "!=", _) | (_, Type::Any | Type::Array) => true,

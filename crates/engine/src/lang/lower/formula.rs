@@ -1,7 +1,7 @@
 //! Expressions of inference blocks: each becomes a function of the program, whose
 //! parameters are the values that the plan supplies.
 
-use super::lowerer::{Around, Lowerer, Lowering, Typed};
+use super::lowerer::{Lowerer, Lowering, PlanScope, Typed};
 use super::scope::{Binding, Body, Meaning, Scope, ScopeKind};
 use crate::lang::builtins::{Builtin, PlanForm, Type};
 use crate::lang::code::{Block, BlockId, BlockKind, Op, Operand, Slot};
@@ -11,22 +11,22 @@ use pcadlang_syntax::span::Span;
 use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
-/// What a function reads.
+/// The slots that a function reads.
 struct Reads {
     /// Its own slots.
     own: Vec<Slot>,
-    /// Whether it reads nothing of the state.
+    /// True if it reads nothing of the state.
     is_closed: bool,
-    /// Whether what it reads of the state depends on no choice.
+    /// True if what it reads of the state depends on no choice.
     is_settled: bool,
 }
 
 impl Lowerer<'_> {
     /// Lowers an expression of an inference block.
-    pub fn formula(&mut self, e: &Expr, around: &Around) -> Formula {
-        let block = self.code.blocks.len() as BlockId;
+    pub fn formula(&mut self, e: &Expr, around: &PlanScope) -> Formula {
+        let block = BlockId::new(self.code.blocks.len());
         let kind = BlockKind::Function { name: Arc::from("infer"), params: [].into(), required: 0 };
-        self.code.blocks.push(Block::new(kind, Some(0)));
+        self.code.blocks.push(Block::new(kind, Some(BlockId::ROOT)));
         let mut scope = Scope::new(block, ScopeKind::Function);
         let mut given = Vec::with_capacity(around.names.len());
         for (i, name) in around.names.iter().enumerate() {
@@ -47,7 +47,7 @@ impl Lowerer<'_> {
         self.bodies = bodies;
         self.scopes.truncate(1);
         self.scopes.extend(scopes);
-        self.code.blocks[block as usize].result = Some(result);
+        self.code.blocks[block].result = Some(result);
         let formula = Formula { kind: self.finished(block, given), span: e.span };
         self.varying += usize::from(!formula.is_constant());
         formula
@@ -55,7 +55,7 @@ impl Lowerer<'_> {
 
     fn parameter(&mut self, block: BlockId, index: usize, span: Span) -> Slot {
         let op = Op::Param { index: index as u16, default: None };
-        self.code.blocks[block as usize].push(op, span)
+        self.code.blocks[block].push(op, span)
     }
 
     /// The form of an expression whose function is lowered: parameters that it does not
@@ -63,9 +63,9 @@ impl Lowerer<'_> {
     fn finished(&mut self, block: BlockId, given: Vec<Given>) -> FormulaKind {
         let Reads { own: read, is_closed, is_settled } = self.reads(block);
         // A block behind it may be that of a computed key.
-        let is_last = self.code.blocks.len() == block as usize + 1;
-        let b = &mut self.code.blocks[block as usize];
-        let param = |slot: Slot| match b.ops[slot as usize] {
+        let is_last = self.code.blocks.len() == block.index() + 1;
+        let b = &mut self.code.blocks[block];
+        let param = |slot: Slot| match b.ops[slot] {
             Op::Param { index, .. } => Some(FormulaKind::Given(given[index as usize].clone())),
             _ => None,
         };
@@ -83,9 +83,9 @@ impl Lowerer<'_> {
             return simple;
         }
         let mut kept = Vec::new();
-        for (slot, op) in (0..).zip(&mut b.ops) {
+        for (slot, op) in b.ops.iter_mut().enumerate() {
             if let Op::Param { index, .. } = op
-                && read.contains(&slot)
+                && read.contains(&Slot::new(slot))
             {
                 kept.push(given[*index as usize].clone());
                 *index = kept.len() as u16 - 1;
@@ -94,23 +94,25 @@ impl Lowerer<'_> {
         FormulaKind::Function { block, given: kept.into(), is_closed, is_settled }
     }
 
-    /// What a function and the blocks inside of it read.
+    /// Returns the slots that a function and the blocks inside of it read.
     fn reads(&self, function: BlockId) -> Reads {
         let mut reads = Reads { own: Vec::new(), is_closed: true, is_settled: true };
         let mut settled = FxHashSet::default();
-        for (id, block) in (function..).zip(&self.code.blocks[function as usize..]) {
+        for (id, block) in self.code.blocks.iter().enumerate().skip(function.index()) {
+            let id = BlockId::new(id);
             let mut operand = |o: Operand| {
                 let (at, slot) = match o {
                     Operand::Const(_) => return,
                     Operand::Local(slot) => (id, slot),
                     Operand::Outer { up, slot } => {
-                        let out = |b: BlockId, _| self.code.blocks[b as usize].parent.unwrap_or(0);
+                        let out =
+                            |b: BlockId, _| self.code.blocks[b].parent.unwrap_or(BlockId::ROOT);
                         ((0..up).fold(id, out), slot)
                     }
                 };
                 if at < function {
                     reads.is_closed = false;
-                    reads.is_settled &= at == 0 && self.is_settled(slot, &mut settled);
+                    reads.is_settled &= at == BlockId::ROOT && self.is_settled(slot, &mut settled);
                 }
                 if at == function {
                     reads.own.push(slot);
@@ -128,13 +130,13 @@ impl Lowerer<'_> {
         reads
     }
 
-    /// Whether a value of the top level is computed without choices and without calls of
+    /// True if a value of the top level is computed without choices and without calls of
     /// functions of the program. `known` are some that are.
     fn is_settled(&self, slot: Slot, known: &mut FxHashSet<Slot>) -> bool {
         if known.contains(&slot) {
             return true;
         }
-        let op = &self.code.blocks[0].ops[slot as usize];
+        let op = &self.code.blocks[BlockId::ROOT].ops[slot];
         let mut settled =
             matches!(op, Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. });
         op.operands(&mut |o| {

@@ -174,7 +174,7 @@ impl Lowerer<'_> {
     }
 }
 
-/// What became of kernels and of their arguments that no longer exist.
+/// The successors of kernels and of their arguments that no longer exist.
 pub(super) fn former(name: &str) -> Option<&'static str> {
     match name {
         "optimize" => Some(

@@ -26,7 +26,7 @@ pub struct DataItem {
     pub name: String,
     /// Its kind: as declared, or the kind that its default reads.
     pub ty: Option<String>,
-    /// Whether it has a default.
+    /// True if it has a default.
     pub has_default: bool,
     /// The reading options of its default; a file that replaces it is read in the same
     /// way.

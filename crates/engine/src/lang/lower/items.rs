@@ -6,7 +6,8 @@ use super::scope::{Body, Meaning, Module, Namespace, Scope, ScopeKind};
 use super::types::{accepts, declared, shown};
 use crate::lang::builtins::Type;
 use crate::lang::builtins::data::Options;
-use crate::lang::code::{BlockKind, Op};
+use crate::lang::code::{BlockId, BlockKind, Op};
+use crate::lang::ids::FrameId;
 use crate::lang::value::{Closure, Value};
 use pcadlang_syntax::ast::{
     Declaration, Expr, ExprKind, FnDecl, Item, ItemKind, Lambda, Stmt, StmtKind,
@@ -164,13 +165,14 @@ impl Lowerer<'_> {
         self.bind(&f.name, Meaning::Function(block), Type::Function);
         self.pending.push(Pending { module: self.module, block, decl: f.clone() });
         if self.modules[self.module].prefix.is_none() {
-            let closure = self.code.constant(Value::Closure(Closure { block, frame: 0 }));
+            let closure =
+                self.code.constant(Value::Closure(Closure { block, frame: FrameId::ROOT }));
             self.code.globals.insert(Arc::clone(&f.name.node), closure);
         }
     }
 
     /// Creates an empty function block.
-    pub fn function_block(&mut self, name: Arc<str>, lambda: &Lambda) -> u32 {
+    pub fn function_block(&mut self, name: Arc<str>, lambda: &Lambda) -> BlockId {
         let params: Arc<[Arc<str>]> =
             lambda.params.iter().map(|p| Arc::clone(&p.name.node)).collect();
         let required =
@@ -184,7 +186,7 @@ impl Lowerer<'_> {
     }
 
     /// Lowers a function's body into its block.
-    pub fn function_body(&mut self, block: u32, lambda: &Lambda) {
+    pub fn function_body(&mut self, block: BlockId, lambda: &Lambda) {
         self.scopes.push(Scope::new(block, ScopeKind::Function));
         self.bodies.push(Body::default());
         for (i, p) in lambda.params.iter().enumerate() {
@@ -199,12 +201,12 @@ impl Lowerer<'_> {
         for (i, p) in lambda.params.iter().enumerate() {
             if let Some(e) = &p.default {
                 let value = self.expr(e).at;
-                self.code.blocks[block as usize].ops[i] =
+                self.code.blocks[block].ops[i] =
                     Op::Param { index: i as u16, default: Some(value) };
             }
         }
         let result = self.body_of(&lambda.body);
-        self.code.blocks[block as usize].result = result.map(|t| t.at);
+        self.code.blocks[block].result = result.map(|t| t.at);
         self.bodies.pop();
         self.scopes.pop();
     }

@@ -30,20 +30,20 @@ pub struct Inputs<'a> {
     pub data: IndexMap<String, Value>,
     /// The reader for `data d = csv("file")`.
     pub read: ReadData<'a>,
-    /// Whether a `data` item without a value is an error; false when a program is only
+    /// True if a `data` item without a value is an error; false when a program is only
     /// checked.
     pub needs_data: bool,
     /// Default values for omitted arguments, by full name of the built-in and name of the
     /// argument.
     pub defaults: FxHashMap<(String, String), Value>,
-    /// What runs even if nothing depends on it.
+    /// The slots that run even if nothing depends on them.
     pub eager: Eager,
 }
 
 /// `report e, … as "file";`
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// What to report.
+    /// The reported expression.
     pub exprs: Vec<Expr>,
     /// The file, if named.
     pub file: Option<Arc<str>>,
@@ -52,7 +52,7 @@ pub struct Report {
 /// `export e to "file";`
 #[derive(Clone, Debug)]
 pub struct Export {
-    /// What to export.
+    /// The exported expression.
     pub expr: Expr,
     /// The file.
     pub file: Arc<str>,
@@ -67,7 +67,7 @@ pub(super) struct Pending {
 
 /// The context of a statement of an inference block.
 #[derive(Clone, Default)]
-pub(super) struct Around {
+pub(super) struct PlanScope {
     /// Variables of the block.
     pub names: Vec<Arc<str>>,
     pub in_loop: bool,
@@ -75,7 +75,7 @@ pub(super) struct Around {
     pub in_kernel: bool,
 }
 
-impl Around {
+impl PlanScope {
     /// Binds a variable.
     pub fn bind(&mut self, name: &Arc<str>) -> usize {
         self.names.push(Arc::clone(name));
@@ -87,7 +87,7 @@ impl Around {
 pub(super) struct Lowering {
     pub block: BlockId,
     pub given: Vec<Given>,
-    pub around: Around,
+    pub around: PlanScope,
 }
 
 pub(super) struct Lowerer<'a> {
@@ -141,7 +141,7 @@ impl<'a> Lowerer<'a> {
             errors: Vec::new(),
             modules: vec![Module::default()],
             module: 0,
-            scopes: vec![Scope::new(0, ScopeKind::Root)],
+            scopes: vec![Scope::new(BlockId::ROOT, ScopeKind::Root)],
             bodies: vec![Body::default()],
             pending: Vec::new(),
             blocks: Vec::new(),
@@ -172,19 +172,19 @@ impl<'a> Lowerer<'a> {
 
     /// Returns the block being built.
     pub fn block(&self) -> BlockId {
-        self.scopes.last().map_or(0, |s| s.block)
+        self.scopes.last().map_or(BlockId::ROOT, |s| s.block)
     }
 
     /// Appends an operation to the block being built.
     pub fn push(&mut self, op: Op, span: Span) -> Slot {
         let block = self.block();
-        self.code.blocks[block as usize].push(op, span)
+        self.code.blocks[block].push(op, span)
     }
 
     pub fn new_block(&mut self, kind: BlockKind) -> BlockId {
         let parent = Some(self.block());
         self.code.blocks.push(Block::new(kind, parent));
-        self.code.blocks.len() as BlockId - 1
+        BlockId::new(self.code.blocks.len() - 1)
     }
 
     pub fn constant(&mut self, v: Value) -> Typed {

@@ -35,7 +35,7 @@ use super::load::Loaded;
 use super::plan::{DeclaredKernel, Plan};
 use super::value::Value;
 use indexmap::IndexMap;
-use lowerer::{Around, Lowerer};
+use lowerer::{Lowerer, PlanScope};
 use pcadlang_syntax::ast::KStmt;
 use pcadlang_syntax::diag::{Diagnostic, SourceMap};
 use rustc_hash::FxHashMap;
@@ -94,5 +94,5 @@ pub fn compile_plan(builtins: Arc<Table>, body: &[KStmt]) -> Plan {
     };
     let (loaded, mut map) = (Loaded::default(), SourceMap::new());
     let mut l = Lowerer::new(&loaded, inputs, &mut map);
-    Plan { steps: l.plan_body(body, &mut Around::default()), ..Plan::default() }
+    Plan { steps: l.plan_body(body, &mut PlanScope::default()), ..Plan::default() }
 }

@@ -3,7 +3,7 @@
 use super::lowerer::{Lowerer, Typed};
 use super::scope::{Binding, Body, Meaning, ScopeKind};
 use crate::lang::builtins::Type;
-use crate::lang::code::{Operand, Site, SiteSegment, SiteTag};
+use crate::lang::code::{Operand, Site, SiteId, SiteSegment, SiteTag};
 use pcadlang_syntax::ast::Name;
 use std::sync::Arc;
 
@@ -101,7 +101,7 @@ impl Lowerer<'_> {
     }
 
     /// Creates a site below the current bindings.
-    pub fn site(&mut self, name: &Arc<str>, own_tags: Vec<SiteTag>, carried: u32) -> u32 {
+    pub fn site(&mut self, name: &Arc<str>, own_tags: Vec<SiteTag>, carried: u32) -> SiteId {
         let occurrence = self.next_occurrence(name);
         self.site_of(name, occurrence, own_tags, carried)
     }
@@ -122,7 +122,7 @@ impl Lowerer<'_> {
         occurrence: u32,
         own_tags: Vec<SiteTag>,
         carried: u32,
-    ) -> u32 {
+    ) -> SiteId {
         let module = self.modules[self.module].prefix.clone();
         if self.bodies.len() == 1
             && let Some(m) = &module
@@ -139,7 +139,7 @@ impl Lowerer<'_> {
         segments.push(SiteSegment::new(Arc::clone(name), occurrence));
         let tags = body.tags.iter().cloned().chain(own_tags).collect();
         self.code.sites.push(Site { segments: segments.into(), carried, tags });
-        self.code.sites.len() as u32 - 1
+        SiteId::new(self.code.sites.len() - 1)
     }
 
     /// Returns the index of a tag's name.

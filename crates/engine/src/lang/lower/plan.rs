@@ -2,7 +2,7 @@
 //! compilation to [plans](crate::lang::plan).
 
 use super::hints::former;
-use super::lowerer::{Around, Lowerer};
+use super::lowerer::{Lowerer, PlanScope};
 use super::types::shown;
 use crate::lang::builtins::{self, Builtin, KernelTraits, Kind, PlanForm, Type};
 use crate::lang::code::Operand;
@@ -20,7 +20,7 @@ impl Lowerer<'_> {
     /// Checks everything except the model, and compiles the plans and declared kernels.
     pub fn inference(&mut self) -> Arc<[DeclaredKernel]> {
         self.module = 0;
-        let top = Around::default();
+        let top = PlanScope::default();
         let freezes = std::mem::take(&mut self.freezes);
         let freezes = freezes.iter().map(|f| self.selection(f, &top)).collect::<Arc<[_]>>();
         for f in self.code.forces.clone() {
@@ -30,7 +30,7 @@ impl Lowerer<'_> {
         let kernels = self.kernels.values().cloned().collect::<Vec<_>>();
         let kernels = kernels.iter().map(|k| self.declared_kernel(k)).collect::<Arc<[_]>>();
         for (name, body) in std::mem::take(&mut self.blocks) {
-            let steps = self.plan_body(&body, &mut Around::default());
+            let steps = self.plan_body(&body, &mut PlanScope::default());
             let (kernels, freezes) = (Arc::clone(&kernels), Arc::clone(&freezes));
             self.plans.push(Arc::new(Plan { name, steps, kernels, freezes }));
         }
@@ -44,14 +44,14 @@ impl Lowerer<'_> {
     }
 
     fn declared_kernel(&mut self, k: &KernelDecl) -> DeclaredKernel {
-        let top = Around::default();
+        let top = PlanScope::default();
         let param = |p: &Param| {
             let default = p.default.as_ref().map(|e| self.formula(e, &top));
             (Arc::clone(&p.name.node), default)
         };
         let params: Box<[_]> = k.params.iter().map(param).collect();
         let names = k.params.iter().map(|p| Arc::clone(&p.name.node)).collect();
-        let mut around = Around { names, in_kernel: true, ..Around::default() };
+        let mut around = PlanScope { names, in_kernel: true, ..PlanScope::default() };
         let steps = self.plan_body(&k.body, &mut around);
         let draws = |s: &StepKind| matches!(s, StepKind::Propose(..) | StepKind::Draw(..));
         let map = |s: &StepKind| matches!(s, StepKind::Map(..) | StepKind::MapDrawn(..));
@@ -60,7 +60,7 @@ impl Lowerer<'_> {
         DeclaredKernel { name: k.name.clone(), params, steps, proposes, maps }
     }
 
-    pub(super) fn plan_body(&mut self, body: &[KStmt], around: &mut Around) -> Box<[Step]> {
+    pub(super) fn plan_body(&mut self, body: &[KStmt], around: &mut PlanScope) -> Box<[Step]> {
         let depth = around.names.len();
         let step = |s: &KStmt| Some(Step { kind: self.plan_stmt(s, around)?, span: s.span });
         let steps = body.iter().filter_map(step).collect();
@@ -69,7 +69,7 @@ impl Lowerer<'_> {
     }
 
     /// Compiles a statement; `None` if it is wrong.
-    fn plan_stmt(&mut self, s: &KStmt, around: &mut Around) -> Option<StepKind> {
+    fn plan_stmt(&mut self, s: &KStmt, around: &mut PlanScope) -> Option<StepKind> {
         Some(match &s.kind {
             KStmtKind::Warmup { count, body } => {
                 if around.in_loop || around.in_kernel {
@@ -81,12 +81,12 @@ impl Lowerer<'_> {
                     .hint_also("infer { warmup 1000 { … } repeat 1000 { … collect x; } }");
                 }
                 let count = self.count(count, around);
-                let mut inner = Around { in_loop: true, in_warmup: true, ..around.clone() };
+                let mut inner = PlanScope { in_loop: true, in_warmup: true, ..around.clone() };
                 StepKind::Warmup(count, self.plan_body(body, &mut inner))
             }
             KStmtKind::Repeat { count, body } => {
                 let count = self.count(count, around);
-                let mut inner = Around { in_loop: true, ..around.clone() };
+                let mut inner = PlanScope { in_loop: true, ..around.clone() };
                 StepKind::Repeat(count, self.plan_body(body, &mut inner))
             }
             KStmtKind::Every { count, body } => {
@@ -109,7 +109,7 @@ impl Lowerer<'_> {
             }
             KStmtKind::For { var, iter, body } => {
                 let items = self.formula(iter, around);
-                let mut inner = Around { in_loop: true, ..around.clone() };
+                let mut inner = PlanScope { in_loop: true, ..around.clone() };
                 let var = inner.bind(&var.node);
                 StepKind::For(items, var, self.plan_body(body, &mut inner))
             }
@@ -172,7 +172,7 @@ impl Lowerer<'_> {
     }
 
     /// Compiles a number of repetitions, or a weight.
-    fn count(&mut self, e: &Expr, around: &Around) -> Formula {
+    fn count(&mut self, e: &Expr, around: &PlanScope) -> Formula {
         let got = match &e.kind {
             ExprKind::Str(_) => Type::Str,
             ExprKind::Bool(_) => Type::Bool,
@@ -187,7 +187,7 @@ impl Lowerer<'_> {
 
     /// Compiles a kernel applied to a selection, or another statement that has the form
     /// of a call.
-    fn kernel(&mut self, e: &Expr, around: &Around) -> Option<StepKind> {
+    fn kernel(&mut self, e: &Expr, around: &PlanScope) -> Option<StepKind> {
         let ExprKind::Call { callee, args } = &e.kind else {
             self.error("expected a kernel", e.span, "not a call of a kernel")
                 .hint_also("for example mh(one(@**)); or drift($tag);");
@@ -264,7 +264,7 @@ impl Lowerer<'_> {
         k: &KernelDecl,
         args: &[Arg],
         e: &Expr,
-        around: &Around,
+        around: &PlanScope,
     ) -> Box<[Argument]> {
         let required = k.params.iter().filter(|p| p.default.is_none()).count();
         if args.len() < required || args.len() > k.params.len() {
@@ -350,7 +350,7 @@ impl Lowerer<'_> {
         b: &Builtin,
         args: &[Arg],
         span: Span,
-        around: &Around,
+        around: &PlanScope,
     ) -> Option<Box<[Argument]>> {
         let order = self.matched(b, args, span)?;
         let of = |(from, arg): (&Option<usize>, &builtins::Argument)| {
@@ -377,7 +377,7 @@ impl Lowerer<'_> {
     }
 
     /// Compiles the argument of a kernel that applies another one.
-    fn inner_kernel(&mut self, outer: &Builtin, e: &Expr, around: &Around) -> Argument {
+    fn inner_kernel(&mut self, outer: &Builtin, e: &Expr, around: &PlanScope) -> Argument {
         let traits = |what| match what {
             Kind::Plan(PlanForm::Kernel(traits)) => traits,
             _ => KernelTraits::default(),
@@ -401,7 +401,7 @@ impl Lowerer<'_> {
     }
 
     /// Compiles what `init` takes.
-    fn start(&mut self, e: &Expr, around: &Around) -> Option<StepKind> {
+    fn start(&mut self, e: &Expr, around: &PlanScope) -> Option<StepKind> {
         let table = Arc::clone(&self.code.builtins);
         let found = call(e).and_then(|(name, args)| Some((self.inference_name(name)?, args)));
         match found {
@@ -441,7 +441,7 @@ impl Lowerer<'_> {
     }
 
     /// Compiles a selection, optionally inside of `one(…)` or `each(…)`.
-    fn choices(&mut self, e: &Expr, around: &Around) -> Choices {
+    fn choices(&mut self, e: &Expr, around: &PlanScope) -> Choices {
         let (pick, inner) = match call(e) {
             Some(("one", [a])) => (Pick::One, &a.value),
             Some(("each", [a])) => (Pick::Each, &a.value),
@@ -451,7 +451,7 @@ impl Lowerer<'_> {
     }
 
     /// Compiles the address of one choice.
-    fn choice(&mut self, e: &Expr, around: &Around) -> Path {
+    fn choice(&mut self, e: &Expr, around: &PlanScope) -> Path {
         match self.selection(e, around) {
             Selection::Path(path) => path,
             // Refused like any other address of several choices.
@@ -460,7 +460,7 @@ impl Lowerer<'_> {
     }
 
     /// Compiles an expression that is recorded with every draw.
-    fn column(&mut self, e: &Expr, around: &Around) -> Option<(String, Operand)> {
+    fn column(&mut self, e: &Expr, around: &PlanScope) -> Option<(String, Operand)> {
         if let ExprKind::Var(v) = &e.kind
             && around.names.contains(v)
         {
@@ -525,7 +525,7 @@ impl Lowerer<'_> {
         for (from, arg) in order.iter().zip(b.args.iter()) {
             let Some(value) = from.map(|j| &args[j].value) else { continue };
             match arg.ty {
-                Type::Selection => drop(self.choices(value, &Around::default())),
+                Type::Selection => drop(self.choices(value, &PlanScope::default())),
                 _ => self.shown_query(value),
             }
         }

@@ -8,7 +8,7 @@ use pcadlang_syntax::span::Span;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
-/// What a name refers to.
+/// The referent of a name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Meaning {
     /// A constant, or a slot of the block in which the name is bound.
@@ -67,7 +67,7 @@ pub(super) struct Body {
     pub tags: Vec<SiteTag>,
     /// The occurrence of a container's name, by block and slot: its elements share it,
     /// wherever they are drawn.
-    pub containers: FxHashMap<(u32, Slot), u32>,
+    pub containers: FxHashMap<(BlockId, Slot), u32>,
 }
 
 /// The top-level names of a file, or of files that share a namespace.
@@ -81,7 +81,7 @@ pub(super) struct Module {
     pub native: Option<Arc<str>>,
 }
 
-/// What `ns` in `ns.name` refers to.
+/// The referent of `ns` in `ns.name`.
 #[derive(Clone, Debug)]
 pub(super) struct Namespace {
     pub module: usize,

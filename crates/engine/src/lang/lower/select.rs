@@ -1,6 +1,6 @@
 //! Selections of choices; the addresses and tags in them must occur in the program.
 
-use super::lowerer::{Around, Lowerer};
+use super::lowerer::{Lowerer, PlanScope};
 use crate::lang::plan::Selection;
 use pcadlang_syntax::ast::{Address, BinaryOp, Expr, ExprKind, SegmentName};
 use pcadlang_syntax::diag::nearest;
@@ -12,10 +12,10 @@ const BUILT_IN: [&str; 4] = ["continuous", "discrete", "gaussian", "finite"];
 
 impl Lowerer<'_> {
     /// Compiles a selection.
-    pub fn selection(&mut self, e: &Expr, around: &Around) -> Selection {
+    pub fn selection(&mut self, e: &Expr, around: &PlanScope) -> Selection {
         self.check_selection(e);
         let read = Selection::read(e, &mut |key| self.formula(key, around));
-        // What is wrong was reported.
+        // The mistake was reported.
         read.unwrap_or_else(|_| Selection::Tag("".into(), None))
     }
 

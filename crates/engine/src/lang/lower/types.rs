@@ -20,7 +20,7 @@ pub(super) fn of_value(v: &Value) -> Type {
     }
 }
 
-/// Whether a value of static type `got` may be of type `wanted`.
+/// True if a value of static type `got` may be of type `wanted`.
 pub(super) fn accepts(wanted: Type, got: Type) -> bool {
     use Type::*;
     match (wanted, got) {

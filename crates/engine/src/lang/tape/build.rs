@@ -31,7 +31,7 @@ pub struct Builder {
     /// The scores recorded since [`Builder::begin_terms`]; if there are none, scores are
     /// added to the sums of the tape.
     terms: Option<Terms>,
-    /// Whether incremental functions start from their evaluation in the last run.
+    /// True if incremental functions start from their evaluation in the last run.
     keeps: bool,
 }
 
@@ -515,7 +515,7 @@ fn one_of(dist: &Dist) -> Dist {
     dist.element(0)
 }
 
-/// Whether a value is a boolean, or an array of booleans.
+/// True if a value is a boolean, or an array of booleans.
 fn is_bools(v: &Value) -> bool {
     match v {
         Value::Bool(_) => true,
@@ -524,7 +524,7 @@ fn is_bools(v: &Value) -> bool {
     }
 }
 
-/// Whether a value is 1 or 0, or an array of these.
+/// True if a value is 1 or 0, or an array of these.
 fn is_zeros_and_ones(v: &Value) -> bool {
     let truth = |x: &f64| *x == 0.0 || *x == 1.0;
     match v {
@@ -534,7 +534,7 @@ fn is_zeros_and_ones(v: &Value) -> bool {
     }
 }
 
-/// Whether a value contains only numbers.
+/// True if a value contains only numbers.
 fn numeric(v: &Value) -> bool {
     match v {
         Value::Num(_) | Value::Array(_) => true,

@@ -39,7 +39,7 @@ pub struct Made {
 }
 
 impl Form {
-    /// Whether it does not depend on the inputs of the tape.
+    /// True if it does not depend on the inputs of the tape.
     pub fn is_fixed(&self) -> bool {
         match self {
             Form::Fixed(_) => true,

@@ -16,7 +16,7 @@ use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::ops::Range;
 
-/// What operations have in common that can be run side by side.
+/// The properties that operations share if they can be run side by side.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 enum Kind {
     Unary(usize, usize),

@@ -13,7 +13,7 @@ pub(super) type Terms = SmallVec<[Term; 2]>;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Term {
     pub column: Column,
-    /// Whether it is raised to the power of the likelihood.
+    /// True if it is raised to the power of the likelihood.
     pub observed: bool,
 }
 
@@ -23,7 +23,7 @@ impl Term {
     fn add(&self, v: &[f64], power: f64, row: &mut [f64]) {
         let Column { at, step, .. } = self.column;
         if self.observed && power != 1.0 {
-            // What is impossible is impossible at every power.
+            // An impossible value is impossible at every power.
             let tempered = |x: f64| if x == f64::NEG_INFINITY { x } else { x * power };
             row.iter_mut().enumerate().for_each(|(i, r)| *r += tempered(v[at + i * step]));
         } else if step == 0 {

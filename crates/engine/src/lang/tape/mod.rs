@@ -156,7 +156,7 @@ impl Tape {
         self.forward()
     }
 
-    /// Whether coordinates are those of their images, which they need not be to the last
+    /// True if coordinates are those of their images, which they need not be to the last
     /// bit.
     fn is_own_image(&self, y: &[f64]) -> bool {
         let (mut rest, mut back) = (y, Vec::new());

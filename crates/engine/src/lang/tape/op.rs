@@ -25,7 +25,7 @@ pub struct ScoreSums {
     pub jacobian: ExactSum,
 }
 
-/// What an operation added to the sums of the scores.
+/// The terms that an operation added to the sums of the scores.
 #[derive(Clone, Debug)]
 pub enum ScoreTerms {
     /// One term.
@@ -48,7 +48,7 @@ pub enum Scored {
     Numbers(Range<usize>, IsArray),
 }
 
-/// Whether terms are those of an array's elements, which may be one.
+/// True if terms are those of an array's elements, which may be one.
 type IsArray = bool;
 
 /// An operation; the numbers it reads precede those it writes.

@@ -3,7 +3,7 @@
 use crate::lang::adjoint::Adjoint;
 use crate::lang::value::Value;
 
-/// What a tape has computed: numbers in one buffer, and values of other kinds (objects,
+/// The results of a tape: numbers in one buffer, and values of other kinds (objects,
 /// likelihoods) in a list.
 #[derive(Debug, Default)]
 pub(super) struct Values {

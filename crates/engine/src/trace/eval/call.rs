@@ -1,12 +1,12 @@
 //! Parameters, calls, branches and `mem`.
 
-use crate::lang::code::{Block, BlockKind, Callee, Code, Op, Operand};
+use crate::lang::code::{Block, BlockKind, Callee, Op, Operand};
 use crate::lang::key::Key;
-use crate::lang::value::{Closure, NodeRef, Value};
+use crate::lang::value::{Closure, Value};
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
-use crate::trace::update::{Failure, Poll};
+use crate::trace::update::{Failure, Step};
 use smallvec::SmallVec;
 use std::sync::Arc;
 
@@ -16,107 +16,100 @@ type WrittenArgs = [(Option<Arc<str>>, Operand)];
 impl Graph {
     pub(super) fn evaluate_param(
         &mut self,
-        code: &Code,
         n: NodeId,
         index: u16,
         default: Option<Operand>,
-    ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
-        if let Some((af, o)) = self.argument(code, n) {
+    ) -> Step {
+        let frame = self.store[n].frame;
+        if let Some((af, o)) = self.argument(n) {
             if let Some(m) = self.unready(af, o) {
-                return self.need(code, m);
+                return self.need(m);
             }
-            let v = self.value(code, af, o).clone();
-            return Ok(self.finish(code, n, v));
+            let v = self.value(af, o).clone();
+            return Ok(self.finish(n, v));
         }
-        match (&self.frames[frame as usize].args, index) {
+        match (&self.store[frame].args, index) {
             (Arguments::Values(vs), i) if (i as usize) < vs.len() => {
                 let v = vs[i as usize].clone();
-                Ok(self.finish(code, n, v))
+                Ok(self.finish(n, v))
             }
             (Arguments::Supplied(vs), i) if (i as usize) < vs.len() => {
                 let v = vs[i as usize].clone()?;
-                Ok(self.finish(code, n, v))
+                Ok(self.finish(n, v))
             }
-            (Arguments::Item, 0) | (Arguments::Fold, 1) => self.evaluate_item(code, n),
-            (Arguments::Fold, 0) => self.evaluate_accumulator(code, n),
+            (Arguments::Item, 0) | (Arguments::Fold, 1) => self.evaluate_item(n),
+            (Arguments::Fold, 0) => self.evaluate_accumulator(n),
             _ => match default {
                 Some(o) => {
                     if let Some(m) = self.unready(frame, o) {
-                        return self.need(code, m);
+                        return self.need(m);
                     }
-                    let v = self.value(code, frame, o).clone();
-                    Ok(self.finish(code, n, v))
+                    let v = self.value(frame, o).clone();
+                    Ok(self.finish(n, v))
                 }
-                None => Err(self.type_error(code, n, "an argument is missing".into())),
+                None => Err(self.type_error(n, "an argument is missing".into())),
             },
         }
     }
 
     pub(super) fn evaluate_if(
         &mut self,
-        code: &Code,
         n: NodeId,
         cond: Operand,
-        then: u32,
-        otherwise: u32,
-    ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        then: BlockId,
+        otherwise: BlockId,
+    ) -> Step {
+        let frame = self.store[n].frame;
         if let Some(m) = self.unready(frame, cond) {
-            return self.need(code, m);
+            return self.need(m);
         }
-        let block = if self.holds(code, n, cond)? { then } else { otherwise };
-        let keep = match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Child(c)) => self.frames[c.frame as usize].block == block,
+        let block = if self.holds(n, cond)? { then } else { otherwise };
+        let keep = match self.store[n].side.as_deref() {
+            Some(Side::Child(c)) => self.store[c.frame].block == block,
             _ => false,
         };
         if !keep {
-            let here = &self.frames[frame as usize];
+            let here = &self.store[frame];
             let child = Frame {
                 block,
                 parent: frame,
                 owner: n,
-                base: 0,
                 path: here.path,
                 depth: here.depth,
-                pass: 0,
-                key: None,
-                args: Arguments::None,
-                attached: true,
+                ..Frame::default()
             };
-            self.replace_child(code, n, child)?;
+            self.replace_child(n, child)?;
         }
-        self.finish_child(code, n)
+        self.finish_child(n)
     }
 
-    /// Whether an evaluated condition holds.
-    fn holds(&self, code: &Code, n: NodeId, cond: Operand) -> Result<bool, Failure> {
-        match self.value(code, self.nodes[n as usize].frame, cond) {
+    /// True if an evaluated condition holds.
+    fn holds(&self, n: NodeId, cond: Operand) -> Result<bool, Failure> {
+        match self.value(self.store[n].frame, cond) {
             Value::Bool(b) => Ok(*b),
-            v => Err(self.type_error(code, n, format!("`if` needs a bool, got {}", v.type_name()))),
+            v => Err(self.type_error(n, format!("`if` needs a bool, got {}", v.type_name()))),
         }
     }
 
     pub(super) fn evaluate_select(
         &mut self,
-        code: &Code,
         n: NodeId,
         cond: Operand,
         then: Operand,
         otherwise: Operand,
-    ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+    ) -> Step {
+        let frame = self.store[n].frame;
         if let Some(m) = self.unready(frame, cond) {
-            return self.need(code, m);
+            return self.need(m);
         }
-        let holds = self.holds(code, n, cond)?;
+        let holds = self.holds(n, cond)?;
         let (chosen, other) = if holds { (then, otherwise) } else { (otherwise, then) };
         if let Some(m) = self.unready(frame, chosen) {
-            return self.need(code, m);
+            return self.need(m);
         }
-        let flags = self.nodes[n as usize].flags;
+        let flags = self.store[n].flags;
         if holds != (flags & OTHERWISE == 0) {
-            self.nodes[n as usize].flags ^= OTHERWISE;
+            self.store[n].flags ^= OTHERWISE;
             if flags & HELD != 0 {
                 let outside = |o| !matches!(o, Operand::Local(_));
                 if let Some(d) = self.resolve(frame, chosen) {
@@ -127,141 +120,145 @@ impl Graph {
                 }
             }
         }
-        let value = self.value(code, frame, chosen).clone();
-        Ok(self.finish(code, n, value))
+        let value = self.value(frame, chosen).clone();
+        Ok(self.finish(n, value))
     }
 
     pub(super) fn evaluate_call(
         &mut self,
-        code: &Code,
         n: NodeId,
         callee: Callee,
         args: &WrittenArgs,
-        site: u32,
-    ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        site: SiteId,
+    ) -> Step {
+        let frame = self.store[n].frame;
         let closure = match callee {
-            Callee::Static(block) => Closure { block, frame: 0 },
+            Callee::Static(block) => Closure { block, frame: FrameId::ROOT },
             Callee::Value(o) => {
                 if let Some(m) = self.unready(frame, o) {
-                    return self.need(code, m);
+                    return self.need(m);
                 }
-                match self.value(code, frame, o) {
+                match self.value(frame, o) {
                     Value::Closure(c) => *c,
                     Value::Memo(r) => {
                         let memo = r.node;
-                        return self.call_memo(code, n, memo, args);
+                        return self.call_memo(n, memo, args);
                     }
                     Value::Builtin(i) => {
                         let i = *i;
-                        return self.call_builtin(code, n, i, args);
+                        return self.call_builtin(n, i, args);
                     }
                     v => {
                         let message =
                             format!("only functions can be called; this is {}", v.type_name());
-                        return Err(self.type_error(code, n, message));
+                        return Err(self.type_error(n, message));
                     }
                 }
             }
         };
-        let keep = match self.nodes[n as usize].side.as_deref() {
+        let keep = match self.store[n].side.as_deref() {
             Some(Side::Child(c)) => {
-                let f = &self.frames[c.frame as usize];
+                let f = &self.store[c.frame];
                 f.block == closure.block && f.parent == closure.frame
             }
             _ => false,
         };
         if !keep {
-            let arguments = self.match_arguments(code, n, closure.block, args)?;
-            let here = &self.frames[frame as usize];
+            let arguments = self.match_arguments(n, closure.block, args)?;
+            let here = &self.store[frame];
             let child = Frame {
                 block: closure.block,
                 parent: closure.frame,
                 owner: n,
-                base: 0,
-                path: self.site_hash(code, frame, site),
+                path: self.site_hash(frame, site),
                 depth: here.depth + 1,
-                pass: 0,
-                key: None,
                 args: arguments,
-                attached: true,
+                ..Frame::default()
             };
-            self.replace_child(code, n, child)?;
+            self.replace_child(n, child)?;
         }
-        self.finish_child(code, n)
+        self.finish_child(n)
     }
 
     /// Detaches the old child frame and creates a new one, whose result is not held yet.
-    fn replace_child(&mut self, code: &Code, n: NodeId, child: Frame) -> Result<(), Failure> {
-        self.let_side_go(code, n);
-        let frame = self.make_frame(code, child)?;
-        self.set_side(n, Some(Side::Child(Child { frame, result: NONE })));
+    fn replace_child(&mut self, n: NodeId, child: Frame) -> Result<(), Failure> {
+        self.let_side_go(n);
+        let frame = self.make_frame(child)?;
+        self.set_side(n, Some(Side::Child(Child { frame, result: NodeId::NONE })));
         Ok(())
     }
 
     /// Takes the value of a call or branch from its child frame.
-    fn finish_child(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let Some(Side::Child(child)) = self.nodes[n as usize].side.as_deref() else {
-            return Ok(self.finish(code, n, Value::Unit));
-        };
-        let child = *child;
-        let Some(result) = code.blocks[self.frames[child.frame as usize].block as usize].result
-        else {
-            return Ok(self.finish(code, n, Value::Unit));
-        };
-        if let Some(m) = self.unready(child.frame, result) {
-            return self.need(code, m);
+    fn finish_child(&mut self, n: NodeId) -> Step {
+        match self.store[n].side.as_deref() {
+            Some(Side::Child(Child { frame, .. })) => self.take_result(n, *frame),
+            _ => Ok(self.finish(n, Value::Unit)),
         }
-        let value = self.value(code, child.frame, result).clone();
-        let node = self.resolve(child.frame, result).unwrap_or(NONE);
-        if child.result != node {
-            if self.nodes[n as usize].flags & HELD != 0 {
-                let outside = !self.is_owned_result(code, node, n);
-                self.acquire(node, n, outside);
+    }
+
+    /// Takes the value of a node from the result of a frame.
+    pub(super) fn take_result(&mut self, n: NodeId, from: FrameId) -> Step {
+        match self.code.blocks[self.store[from].block].result {
+            Some(result) => self.take_operand(n, from, result),
+            None => Ok(self.finish(n, Value::Unit)),
+        }
+    }
+
+    /// Takes the value of a node from an operand of a frame, which it holds as its result.
+    pub(super) fn take_operand(&mut self, n: NodeId, from: FrameId, operand: Operand) -> Step {
+        if let Some(m) = self.unready(from, operand) {
+            return self.need(m);
+        }
+        let value = self.value(from, operand).clone();
+        let new = self.resolve(from, operand).unwrap_or(NodeId::NONE);
+        let Node { side, flags, .. } = &mut self.store[n];
+        if let Some(old) = side.as_deref_mut().and_then(Side::result).map(|r| *r)
+            && old != new
+        {
+            let mut side = side.as_deref().cloned();
+            if *flags & HELD != 0 {
+                if new != NodeId::NONE {
+                    let owned =
+                        matches!(side, Some(Side::Child(_))) && self.is_owned_result(new, n);
+                    self.acquire(new, n, !owned);
+                }
+                if old != NodeId::NONE {
+                    self.release(old, true);
+                }
             }
-            self.set_side(n, Some(Side::Child(Child { result: node, ..child })));
+            side.as_mut().and_then(Side::result).into_iter().for_each(|r| *r = new);
+            self.set_side(n, side);
         }
-        Ok(self.finish(code, n, value))
+        Ok(self.finish(n, value))
     }
 
     /// Matches arguments to parameters by position and name.
     fn match_arguments(
         &self,
-        code: &Code,
         n: NodeId,
-        block: u32,
+        block: BlockId,
         args: &WrittenArgs,
     ) -> Result<Arguments, Failure> {
-        let BlockKind::Function { name, params, required } = &code.blocks[block as usize].kind
-        else {
+        let BlockKind::Function { name, params, required } = &self.code.blocks[block].kind else {
             return Ok(Arguments::None);
         };
         match match_names(name, params, *required, args.iter().map(|(k, _)| k.as_deref())) {
             Ok(None) => Ok(Arguments::Positional(args.len() as u16)),
             Ok(Some(map)) => Ok(Arguments::Mapped(map)),
-            Err(message) => Err(self.type_error(code, n, message)),
+            Err(message) => Err(self.type_error(n, message)),
         }
     }
 
-    fn call_builtin(
-        &mut self,
-        code: &Code,
-        n: NodeId,
-        builtin: u32,
-        args: &WrittenArgs,
-    ) -> Result<Poll, Failure> {
-        if !matches!(
-            self.nodes[n as usize].side.as_deref(),
-            None | Some(Side::Deps(_) | Side::Kept(_))
-        ) {
-            self.let_side_go(code, n);
+    fn call_builtin(&mut self, n: NodeId, builtin: u32, args: &WrittenArgs) -> Step {
+        if !matches!(self.store[n].side.as_deref(), None | Some(Side::Deps(_) | Side::Kept(_))) {
+            self.let_side_go(n);
         }
-        let frame = self.nodes[n as usize].frame;
-        let b = code.builtins.get(builtin);
-        let order = b.match_names(args.iter().map(|(k, _)| k.as_deref()));
-        let order = order.map_err(|message| self.type_error(code, n, message))?;
+        let frame = self.store[n].frame;
+        let order =
+            self.code.builtins.get(builtin).match_names(args.iter().map(|(k, _)| k.as_deref()));
+        let order = order.map_err(|message| self.type_error(n, message))?;
         let operands: SmallVec<[Operand; 8]> = args.iter().map(|(_, o)| *o).collect();
-        if let Some(step) = self.await_plain(code, n, frame, &operands)? {
+        if let Some(step) = self.await_plain(frame, &operands)? {
             return Ok(step);
         }
         let mut deps: Deps = operands.iter().filter_map(|o| self.resolve(frame, *o)).collect();
@@ -270,146 +267,123 @@ impl Graph {
             let values: SmallVec<[&Value; 8]> = order
                 .iter()
                 .map(|i| match i {
-                    Some(i) => self.plain(code, frame, operands[*i], &mut gathered),
+                    Some(i) => self.plain(frame, operands[*i], &mut gathered),
                     None => &Value::Unit,
                 })
                 .collect();
             deps.extend(gathered);
-            self.apply_at(n, b, &values)
+            self.apply_at(n, self.code.builtins.get(builtin), &values)
         };
-        let made = made.map_err(|e| self.fault(code, n, e))?;
-        self.finish_call(code, n, deps, made)
+        let made = made.map_err(|e| self.fault(n, e))?;
+        self.finish_call(n, deps, made)
     }
 
-    pub(super) fn evaluate_mem(
-        &mut self,
-        code: &Code,
-        n: NodeId,
-        f: Operand,
-    ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+    pub(super) fn evaluate_mem(&mut self, n: NodeId, f: Operand) -> Step {
+        let frame = self.store[n].frame;
         if let Some(m) = self.unready(frame, f) {
-            return self.need(code, m);
+            return self.need(m);
         }
-        let closure = match self.value(code, frame, f) {
+        let closure = match self.value(frame, f) {
             Value::Closure(c) => *c,
             v => {
                 let message =
                     format!("mem: needs a function defined in the program, got {}", v.type_name());
-                return Err(self.type_error(code, n, message));
+                return Err(self.type_error(n, message));
             }
         };
         if let (Some(Side::Memo(m)), Value::Memo(_)) =
-            (self.nodes[n as usize].side.as_deref(), &self.nodes[n as usize].value)
+            (self.store[n].side.as_deref(), &self.store[n].value)
             && (m.block, m.parent) == (closure.block, closure.frame)
         {
-            return Ok(self.finish_unchanged(code, n));
+            return Ok(self.finish_unchanged(n));
         }
-        self.drop_structure(code, n);
+        self.drop_structure(n);
         let memo =
             Memo { block: closure.block, parent: closure.frame, entries: Default::default() };
         self.set_side(n, Some(Side::Memo(memo)));
-        self.version += 1;
-        let version = self.version;
-        Ok(self.finish(code, n, Value::Memo(NodeRef { node: n, version })))
+        let made = self.store.new_version(n);
+        Ok(self.finish(n, Value::Memo(made)))
     }
 
     /// Evaluates a call through `mem`: finds or creates the entry for its arguments.
-    fn call_memo(
-        &mut self,
-        code: &Code,
-        n: NodeId,
-        memo: NodeId,
-        args: &WrittenArgs,
-    ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+    fn call_memo(&mut self, n: NodeId, memo: NodeId, args: &WrittenArgs) -> Step {
+        let frame = self.store[n].frame;
         let operands: SmallVec<[Operand; 4]> = args.iter().map(|(_, o)| *o).collect();
-        if let Some(step) = self.await_plain(code, n, frame, &operands)? {
+        if let Some(step) = self.await_plain(frame, &operands)? {
             return Ok(step);
         }
         let mut deps: Deps = operands.iter().filter_map(|o| self.resolve(frame, *o)).collect();
         let mut gathered = Deps::new();
         let values: SmallVec<[Value; 4]> =
-            operands.iter().map(|o| self.plain(code, frame, *o, &mut gathered).clone()).collect();
+            operands.iter().map(|o| self.plain(frame, *o, &mut gathered).clone()).collect();
         deps.extend(gathered);
         let keys: Option<Vec<Key>> = values.iter().map(Key::from_value).collect();
         let Some(keys) = keys else {
             let message = "the arguments of a `mem` function must be numbers, strings, bools, or arrays of them";
-            return Err(self.type_error(code, n, message.into()));
+            return Err(self.type_error(n, message.into()));
         };
         let key = if keys.len() == 1 { keys[0].clone() } else { Key::List(keys.into()) };
-        let same = match self.nodes[n as usize].side.as_deref() {
+        let same = match self.store[n].side.as_deref() {
             Some(Side::MemoCall(c)) => c.memo == memo && c.key == key,
             _ => false,
         };
         if !same {
-            let entry = self.enter_memo(code, n, memo, &key, &values, args)?;
-            self.let_side_go(code, n);
-            if self.nodes[n as usize].flags & HELD != 0 {
+            let entry = self.enter_memo(n, memo, &key, &values, args)?;
+            self.let_side_go(n);
+            if self.store[n].flags & HELD != 0 {
                 deps.iter().for_each(|d| self.acquire(*d, n, true));
             }
-            self.set_side(n, Some(Side::MemoCall(MemoCall { memo, key, result: NONE, deps })));
-            debug_assert!(self.frames[entry as usize].attached);
+            self.set_side(
+                n,
+                Some(Side::MemoCall(MemoCall { memo, key, result: NodeId::NONE, deps })),
+            );
+            debug_assert!(self.store[entry].attached);
         }
-        self.finish_memo(code, n)
+        self.finish_memo(n)
     }
 
-    fn finish_memo(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let Some(Side::MemoCall(call)) = self.nodes[n as usize].side.as_deref() else {
-            return Ok(self.finish(code, n, Value::Unit));
+    fn finish_memo(&mut self, n: NodeId) -> Step {
+        let side = |n: NodeId| self.store[n].side.as_deref();
+        let Some(Side::MemoCall(call)) = side(n) else {
+            return Ok(self.finish(n, Value::Unit));
         };
-        let call = call.clone();
-        let entry = match self.nodes[call.memo as usize].side.as_deref() {
-            Some(Side::Memo(m)) => m.entries.get(&call.key).map(|e| e.0),
-            _ => None,
-        };
-        let Some(entry) = entry else { return Ok(self.finish(code, n, Value::Unit)) };
-        let Some(result) = code.blocks[self.frames[entry as usize].block as usize].result else {
-            return Ok(self.finish(code, n, Value::Unit));
-        };
-        if let Some(m) = self.unready(entry, result) {
-            return self.need(code, m);
-        }
-        let value = self.value(code, entry, result).clone();
-        let node = self.resolve(entry, result).unwrap_or(NONE);
-        if call.result != node {
-            if self.nodes[n as usize].flags & HELD != 0 {
-                self.acquire(node, n, true);
+        match side(call.memo) {
+            Some(Side::Memo(m)) if m.entries.contains_key(&call.key) => {
+                let entry = m.entries[&call.key].0;
+                self.take_result(n, entry)
             }
-            self.set_side(n, Some(Side::MemoCall(MemoCall { result: node, ..call })));
+            _ => Ok(self.finish(n, Value::Unit)),
         }
-        Ok(self.finish(code, n, value))
     }
 
     /// Adds a call to an entry, which is created if it is new.
     fn enter_memo(
         &mut self,
-        code: &Code,
         n: NodeId,
         memo: NodeId,
         key: &Key,
         values: &[Value],
         args: &WrittenArgs,
     ) -> Result<FrameId, Failure> {
-        let Some(Side::Memo(m)) = self.nodes[memo as usize].side.as_deref() else {
-            return Err(self.type_error(code, n, "this `mem` function no longer exists".into()));
+        let Some(Side::Memo(m)) = self.store[memo].side.as_deref() else {
+            return Err(self.type_error(n, "this `mem` function no longer exists".into()));
         };
         let (block, parent) = (m.block, m.parent);
         let old = m.entries.get(key).copied();
         let new = match old {
             Some((frame, calls)) => (frame, calls + 1),
             None => {
-                match self.match_arguments(code, n, block, args)? {
+                match self.match_arguments(n, block, args)? {
                     Arguments::Positional(_) => {}
                     _ => {
                         let message = "give the arguments of a `mem` function by position".into();
-                        return Err(self.type_error(code, n, message));
+                        return Err(self.type_error(n, message));
                     }
                 }
-                let Op::Mem { site, .. } = self.op(code, memo) else {
-                    return Err(self.type_error(code, n, "not a `mem` function".into()));
+                let Op::Mem { site, .. } = self.op(memo) else {
+                    return Err(self.type_error(n, "not a `mem` function".into()));
                 };
-                let home = self.nodes[memo as usize].frame;
+                let home = self.store[memo].frame;
                 // The values that the key stands for: calls with 0 and -0 share one
                 // entry, and the result must not depend on which came first.
                 let values: Arc<[Value]> = match key {
@@ -422,44 +396,42 @@ impl Graph {
                     block,
                     parent,
                     owner: memo,
-                    base: 0,
-                    path: self.keyed_site_hash(code, home, *site, key),
-                    depth: self.frames[self.nodes[n as usize].frame as usize].depth + 1,
-                    pass: 0,
+                    path: self.keyed_site_hash(home, *site, key),
+                    depth: self.store[self.store[n].frame].depth + 1,
                     key: Some(key.clone()),
                     args: Arguments::Values(values),
-                    attached: true,
+                    ..Frame::default()
                 };
-                (self.make_frame(code, frame)?, 1)
+                (self.make_frame(frame)?, 1)
             }
         };
-        if let Some(Side::Memo(m)) = self.nodes[memo as usize].side.as_deref_mut() {
+        if let Some(Side::Memo(m)) = self.store[memo].side.as_deref_mut() {
             m.entries.insert(key.clone(), new);
         }
-        self.note(Entry::Memo(memo, key.clone(), old));
+        self.update.note(Entry::Memo(memo, key.clone(), old));
         Ok(new.0)
     }
 
     /// Removes a call from an entry; an entry without calls is dropped at the end of the
     /// update.
     pub(crate) fn leave_memo(&mut self, memo: NodeId, key: &Key) {
-        let Some(Side::Memo(m)) = self.nodes[memo as usize].side.as_deref_mut() else { return };
+        let Some(Side::Memo(m)) = self.store[memo].side.as_deref_mut() else { return };
         let Some(entry) = m.entries.get_mut(key) else { return };
         let old = *entry;
         entry.1 -= 1;
         if entry.1 == 0 {
-            self.idle.push((memo, key.clone()));
+            self.update.idle.push((memo, key.clone()));
         }
-        self.note(Entry::Memo(memo, key.clone(), Some(old)));
+        self.update.note(Entry::Memo(memo, key.clone(), Some(old)));
     }
 
     /// Drops an entry that still has no calls.
-    pub(crate) fn drop_idle(&mut self, code: &Code, memo: NodeId, key: &Key) {
-        let Some(Side::Memo(m)) = self.nodes[memo as usize].side.as_deref_mut() else { return };
+    pub(crate) fn drop_idle(&mut self, memo: NodeId, key: &Key) {
+        let Some(Side::Memo(m)) = self.store[memo].side.as_deref_mut() else { return };
         let Some(&(frame, 0)) = m.entries.get(key) else { return };
         m.entries.remove(key);
-        self.note(Entry::Memo(memo, key.clone(), Some((frame, 0))));
-        self.detach(code, frame);
+        self.update.note(Entry::Memo(memo, key.clone(), Some((frame, 0))));
+        self.detach(frame);
     }
 }
 

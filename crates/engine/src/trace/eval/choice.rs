@@ -1,255 +1,166 @@
 //! Random choices: drawn when first needed, and absorbing or changed after that.
 
-use crate::lang::code::{Code, DistSpec, Op, Operand};
-use crate::lang::error::{Fault, FaultKind};
+use crate::lang::code::{DistSpec, Operand};
+use crate::lang::error::FaultKind;
 use crate::lang::key::Key;
 use crate::lang::value::Value;
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
 use crate::trace::propose::{Change, Constraint};
-use crate::trace::update::{Failure, Poll};
+use crate::trace::update::{Failure, Step};
 use pcadlang_numerics::dist::{Datum, Dist};
 use smallvec::SmallVec;
 
 impl Graph {
     pub(super) fn evaluate_draw(
         &mut self,
-        code: &Code,
         n: NodeId,
         spec: &DistSpec,
-        site: u32,
+        site: SiteId,
         keys: &[Operand],
-    ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+    ) -> Step {
+        let frame = self.store[n].frame;
         let mut deps = Deps::new();
-        let dist = match self.dist_now(code, n, frame, spec, &mut deps) {
+        let dist = match self.dist_now(n, spec, &mut deps) {
             Ok(dist) => dist?,
-            Err(m) => return self.need(code, m),
+            Err(m) => return self.need(m),
         };
-        if let Some(step) = self.await_all(code, frame, keys)? {
+        if let Some(step) = self.await_all(frame, keys)? {
             return Ok(step);
         }
-        let stale = self.nodes[n as usize].flags & WAS_STALE != 0;
+        let stale = self.store[n].flags & WAS_STALE != 0;
         let own = match keys {
             [] => None,
             _ if stale && !self.any_changed(frame, keys) => self.own_hash(n),
-            _ => Some(self.own_keyed(code, n, frame, site, keys)?),
+            _ => Some(self.own_keyed(n, frame, site, keys)?),
         };
         if stale {
-            let moved = own.is_some_and(|h| self.choice_hash(code, n) != h);
-            if !moved && self.update_choice(code, n, &dist)? {
+            let moved = own.is_some_and(|h| self.choice_hash(n) != h);
+            if !moved && self.update_choice(n, &dist)? {
                 self.set_deps(n, deps);
-                return Ok(self.finish_unchanged(code, n));
+                return Ok(self.finish_unchanged(n));
             }
             // Invalidation stops at plain numbers, so the users of this one were not
             // invalidated for a change of its form.
-            let was_told =
-                self.nodes[n as usize].flags & TARGET != 0 || self.may_be_redrawn(code, n);
+            let was_told = self.store[n].flags & TARGET != 0 || self.may_be_redrawn(n);
             if !moved && !was_told {
-                return Err(self.reformed(code, n));
+                return Err(self.reformed(n));
             }
-            self.retire_choice(code, n);
-            if self.nodes[n as usize].flags & HELD != 0 {
+            self.retire_choice(n);
+            if self.store[n].flags & HELD != 0 {
                 let mut side: SmallVec<[NodeId; 4]> = SmallVec::new();
-                self.each_side_dep(code, n, |d, _| side.push(d));
+                self.each_side_dep(n, |d, _| side.push(d));
                 side.iter().for_each(|d| self.release(*d, true));
             }
             self.set_side(n, None);
         }
-        let hash = own.unwrap_or_else(|| self.site_hash(code, frame, site));
-        let value = self.draw_fresh(code, n, &dist, hash, own)?;
+        let hash = own.unwrap_or_else(|| self.site_hash(frame, site));
+        let value = self.draw_fresh(n, &dist, hash, own)?;
         self.set_deps(n, deps);
-        let epoch = self.epoch;
-        let node = &mut self.nodes[n as usize];
+        let epoch = self.update.epoch;
+        let node = &mut self.store[n];
         node.value = value;
         node.changed = epoch;
         node.flags &= !TARGET;
-        Ok(self.finish_unchanged(code, n))
+        Ok(self.finish_unchanged(n))
     }
 
-    fn reformed(&self, code: &Code, n: NodeId) -> Failure {
+    fn reformed(&self, n: NodeId) -> Failure {
         let message = "the choice is a number, but its parameters became arrays".to_owned();
         let hint = "write two choices, one for each: if c { a ~ normal([0, 1], 1); a } else { b ~ normal(0, 1); b }";
-        self.fail(code, n, FaultKind::Type, message, Some(hint.into()))
+        self.fail(n, FaultKind::Type, message, Some(hint.into()))
     }
 
-    /// Whether one of these operands changed in this update.
+    /// True if one of these operands changed in this update.
     fn any_changed(&self, frame: FrameId, operands: &[Operand]) -> bool {
         let changed = |o: &Operand| {
-            self.resolve(frame, *o).is_some_and(|d| self.nodes[d as usize].changed == self.epoch)
+            self.resolve(frame, *o).is_some_and(|d| self.store[d].changed == self.update.epoch)
         };
         operands.iter().any(changed)
     }
 
-    /// Returns the address hash of a keyed choice.
-    fn own_hash(&self, n: NodeId) -> Option<u64> {
-        match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Choice(c)) => c.hash,
-            _ => None,
-        }
-    }
-
-    /// Returns the distribution of a draw or observation whose parameters are evaluated.
-    pub(crate) fn make_dist(
-        &self,
-        code: &Code,
-        n: NodeId,
-        frame: FrameId,
-        spec: &DistSpec,
-        deps: &mut Deps,
-    ) -> Result<Dist, Failure> {
-        match self.dist_now(code, n, frame, spec, deps) {
-            Ok(dist) => dist,
-            Err(_) => Err(self.type_error(code, n, "its parameters are not evaluated".into())),
-        }
-    }
-
-    /// Returns the distribution of a draw or observation, or else the node to wait for.
-    pub(crate) fn dist_now(
-        &self,
-        code: &Code,
-        n: NodeId,
-        frame: FrameId,
-        spec: &DistSpec,
-        deps: &mut Deps,
-    ) -> Result<Result<Dist, Failure>, NodeId> {
-        let values = self.inputs(code, frame, spec.operands(), deps)?;
-        Ok(self.dist_of_values(code, n, spec, &values))
-    }
-
-    /// Returns the distribution with these parameters.
-    pub(crate) fn dist_of_values(
-        &self,
-        code: &Code,
-        n: NodeId,
-        spec: &DistSpec,
-        values: &[&Value],
-    ) -> Result<Dist, Failure> {
-        let made = match spec {
-            DistSpec::Family { builtin, .. } => code.builtins.get(*builtin).distribution(values),
-            DistSpec::Value(_) => match values[0] {
-                Value::Dist(d) => Ok(Dist::clone(d)),
-                Value::Likelihood(l) => {
-                    let message =
-                        format!("`{}` is a likelihood: it can be observed, not drawn", l.name());
-                    Err(Fault::type_error(message))
-                }
-                v => Err(Fault::type_error(format!(
-                    "`~` needs a distribution, got {}",
-                    v.type_name()
-                ))
-                .with_hint("write `=` to bind a value")),
-            },
-        };
-        made.map_err(|f| self.fault(code, n, f))
-    }
-
     fn own_keyed(
         &self,
-        code: &Code,
         n: NodeId,
         frame: FrameId,
-        site: u32,
+        site: SiteId,
         keys: &[Operand],
     ) -> Result<u64, Failure> {
-        let own = self.own_keys(code, frame, keys);
+        let own = self.own_keys(frame, keys);
         if own.len() < keys.len() {
             keys.iter()
-                .try_for_each(|k| Key::of(self.value(code, frame, *k)).map(drop))
-                .map_err(|f| self.fault(code, n, f))?;
+                .try_for_each(|k| Key::of(self.value(frame, *k)).map(drop))
+                .map_err(|f| self.fault(n, f))?;
         }
-        Ok(self.own_keyed_hash(code, frame, site, &own))
-    }
-
-    /// Returns the hash of a choice's address.
-    pub(crate) fn choice_hash(&self, code: &Code, n: NodeId) -> u64 {
-        if let Some(Side::Choice(c)) = self.nodes[n as usize].side.as_deref()
-            && let Some(h) = c.hash
-        {
-            return h;
-        }
-        match self.op(code, n) {
-            Op::Draw { site, .. } => self.site_hash(code, self.nodes[n as usize].frame, *site),
-            _ => 0,
-        }
+        Ok(self.own_keyed_hash(frame, site, &own))
     }
 
     /// Gives a choice its first value, from the constraints or the prior.
     fn draw_fresh(
         &mut self,
-        code: &Code,
         n: NodeId,
         dist: &Dist,
         hash: u64,
         own: Option<u64>,
     ) -> Result<Value, Failure> {
-        self.appeared += 1;
+        self.update.appeared += 1;
         self.set_improper(n, dist);
-        if let Some(count) = dist.elements() {
-            let mut stored = Vec::with_capacity(count);
-            let mut scores = Vec::with_capacity(count);
-            let whole = self.constraints.get(&hash).and_then(|c| c.whole(dist));
-            for i in 0..count {
-                let at = element_hash(hash, i);
-                let one = dist.element(i);
-                let given = whole.as_ref().and_then(|w| element(w, i));
-                let given = given.or_else(|| self.constraints.get(&at).and_then(|c| c.whole(&one)));
-                let x = match &given {
-                    Some(x) => x.clone(),
-                    None => self.drawn_now(code, n, &one, at)?,
-                };
-                let score = one.log_density_stored(&x);
-                self.add_prior(score, given.is_none());
-                scores.push(score);
-                stored.push(Value::from_datum(&x));
+        let given = self.update.constraints.get(&hash).and_then(|c| c.whole(dist));
+        let elements = dist.elements();
+        let mut side = ChoiceSide { hash: own, ..ChoiceSide::default() };
+        let value = match elements {
+            Some(count) => {
+                let mut values = Vec::with_capacity(count);
+                side.elements = count as u32;
+                for i in 0..count {
+                    let given = given.as_ref().and_then(|w| element(w, i));
+                    let (one, at) = (dist.element(i), element_hash(hash, i));
+                    let (x, score) = self.draw_one(n, &one, at, given)?;
+                    side.scores.push(score);
+                    values.push(Value::from_datum(&x));
+                }
+                Value::from_elements(values)
             }
-            let side = ChoiceSide {
-                stored: None,
-                scores,
-                elements: count as u32,
-                hash: own,
-                deps: Deps::new(),
-            };
-            self.set_side(n, Some(Side::Choice(side)));
-            self.register_choice(code, n, hash, Some(count), dist)?;
-            return Ok(Value::from_elements(stored));
-        }
-        let given = self.constraints.get(&hash).and_then(|c| c.whole(dist));
-        let stored = match &given {
-            Some(x) => x.clone(),
-            None => self.drawn_now(code, n, dist, hash)?,
+            None => {
+                let (x, score) = self.draw_one(n, dist, hash, given)?;
+                self.store[n].score = score;
+                let value = shown(dist, &x);
+                side.stored = dist.is_stored_whitened().then_some(x);
+                value
+            }
         };
-        let score = dist.log_density_stored(&stored);
-        self.add_prior(score, given.is_none());
-        self.nodes[n as usize].score = score;
-        let whitened = dist.is_stored_whitened();
-        let value = Value::from_datum(&if whitened {
-            dist.from_noncentred(&stored)
-        } else {
-            stored.clone()
-        });
-        if whitened || own.is_some() {
-            let side = ChoiceSide {
-                stored: whitened.then_some(stored),
-                scores: Vec::new(),
-                elements: NONE,
-                hash: own,
-                deps: Deps::new(),
-            };
+        if elements.is_some() || own.is_some() || side.stored.is_some() {
             self.set_side(n, Some(Side::Choice(side)));
         }
-        self.register_choice(code, n, hash, None, dist)?;
+        self.choices.register((&self.store, &mut self.update), n, hash, elements, dist);
         Ok(value)
     }
 
+    /// Gives a choice or an element of one its first value, and scores it.
+    fn draw_one(
+        &mut self,
+        n: NodeId,
+        dist: &Dist,
+        hash: u64,
+        given: Option<Datum>,
+    ) -> Result<(Datum, f64), Failure> {
+        let given =
+            given.or_else(|| self.update.constraints.get(&hash).and_then(|c| c.whole(dist)));
+        let is_drawn = given.is_none();
+        let x = given.map_or_else(|| self.drawn_now(n, dist, hash), Ok)?;
+        let score = dist.log_density_stored(&x);
+        self.score.add_prior(score, is_drawn);
+        Ok((x, score))
+    }
+
     /// Draws from the prior, or in a first run where that is asked for uniformly.
-    fn drawn_now(&self, code: &Code, n: NodeId, dist: &Dist, hash: u64) -> Result<Datum, Failure> {
-        if dist.is_improper() && !self.starting {
-            return Err(self.improper(code, n, dist));
+    fn drawn_now(&self, n: NodeId, dist: &Dist, hash: u64) -> Result<Datum, Failure> {
+        if dist.is_improper() && !self.update.starting {
+            return Err(self.improper(n, dist));
         }
-        let mut rng = self.draws.stream(hash);
-        if let Some(width) = self.spread {
+        let mut rng = self.update.draws.stream(hash);
+        if let Some(width) = self.update.spread {
             let support = dist.stored_support();
             if !support.is_discrete() {
                 let free: Vec<f64> =
@@ -261,11 +172,11 @@ impl Graph {
     }
 
     fn set_improper(&mut self, n: NodeId, dist: &Dist) {
-        let flags = &mut self.nodes[n as usize].flags;
+        let flags = &mut self.store[n].flags;
         *flags = if dist.is_improper() { *flags | IMPROPER } else { *flags & !IMPROPER };
     }
 
-    fn improper(&self, code: &Code, n: NodeId, dist: &Dist) -> Failure {
+    fn improper(&self, n: NodeId, dist: &Dist) -> Failure {
         let message = format!("`{}` is improper, so it cannot be sampled", dist.name());
         // Kernels reject such draws. Here no observation depends on the choice, so that no kernel
         // could move it either.
@@ -274,28 +185,21 @@ impl Graph {
             _ => "give it a proper prior, such as normal(0, 10)",
         };
         let hint = format!("observe something that depends on it, or {proper}");
-        self.fail(code, n, FaultKind::Domain, message, Some(hint))
-    }
-
-    fn add_prior(&mut self, score: f64, drawn: bool) {
-        self.prior.add(score);
-        if drawn {
-            self.drawn.add(score);
-        }
+        self.fail(n, FaultKind::Domain, message, Some(hint))
     }
 
     /// Re-scores a choice under its distribution and applies the pending changes. False
     /// if its form no longer fits (number of elements or dimensions); it must then be
     /// resampled.
-    fn update_choice(&mut self, code: &Code, n: NodeId, dist: &Dist) -> Result<bool, Failure> {
-        if let Some(Side::Choice(c)) = self.nodes[n as usize].side.as_deref()
+    fn update_choice(&mut self, n: NodeId, dist: &Dist) -> Result<bool, Failure> {
+        if let Some(Side::Choice(c)) = self.store[n].side.as_deref()
             && c.elements != NONE
         {
             if dist.elements() != Some(c.elements as usize) {
                 return Ok(false);
             }
             self.set_improper(n, dist);
-            self.update_elements(code, n, dist)?;
+            self.update_elements(n, dist)?;
             return Ok(true);
         }
         if dist.elements().is_some() {
@@ -310,197 +214,161 @@ impl Graph {
             return Ok(false);
         }
         self.set_improper(n, dist);
-        let old_score = self.nodes[n as usize].score;
+        let old_score = self.store[n].score;
         let mut change = None;
-        if self.nodes[n as usize].flags & TARGET != 0 {
-            change = self.pending_of(n).find(|p| p.element == NONE).map(|p| p.change.clone());
+        if self.store[n].flags & TARGET != 0 {
+            change =
+                self.update.pending_of(n).find(|p| p.element == NONE).map(|p| p.change.clone());
         }
-        let (new, from_prior) = match change {
-            None => (None, false),
-            Some(Change::Set(d)) => (Some(d), false),
-            Some(Change::Value(d)) => match dist.to_noncentred(&d) {
-                Some(x) => (Some(x), false),
+        let new = match &change {
+            None => None,
+            Some(change) => match self.changed(n, dist, change, None)? {
+                None if matches!(change, Change::White(_)) => {
+                    return Err(self.not_gaussian(n));
+                }
                 None => {
-                    return Err(self.type_error(
-                        code,
-                        n,
-                        "the value does not fit the choice".into(),
-                    ));
+                    let message = "the value does not fit the choice".into();
+                    return Err(self.type_error(n, message));
                 }
+                new => new,
             },
-            Some(Change::Resample) => {
-                let hash = self.choice_hash(code, n);
-                (Some(self.drawn_now(code, n, dist, hash)?), true)
-            }
-            Some(Change::Free(y)) => {
-                let support = dist.stored_support();
-                if support.free_dim() != y.len() {
-                    let message = "the choice changed its dimension".to_owned();
-                    return Err(self.fail(code, n, FaultKind::Domain, message, None));
-                }
-                let (x, jacobian) = support.from_free(&y);
-                self.jacobian.add(jacobian);
-                (Some(x), false)
-            }
-            Some(Change::White(z)) => {
-                let coloured = if whitened { Some(Datum::Vec(z.into())) } else { dist.colour(&z) };
-                match coloured {
-                    Some(x) => (Some(x), true),
-                    None => return Err(self.not_gaussian(code, n)),
-                }
-            }
         };
         let stored = new.as_ref().unwrap_or(&old);
         let score = dist.log_density_stored(stored);
-        self.prior.sub(old_score);
-        self.prior.add(score);
-        if from_prior {
-            self.undrawn.add(old_score);
-            self.drawn.add(score);
-            self.redrawn.push((n, NONE));
+        self.score.prior.sub(old_score);
+        self.score.prior.add(score);
+        if change.is_some_and(|c| c.is_from_prior()) {
+            self.score.undrawn.add(old_score);
+            self.score.drawn.add(score);
+            self.update.redrawn.push((n, NONE));
         }
-        self.nodes[n as usize].score = score;
-        self.nodes[n as usize].flags &= !TARGET;
+        self.store[n].score = score;
+        self.store[n].flags &= !TARGET;
         if new.is_some() || whitened {
-            let value = Value::from_datum(&if whitened {
-                dist.from_noncentred(stored)
-            } else {
-                stored.clone()
-            });
-            let epoch = self.epoch;
-            let node = &mut self.nodes[n as usize];
-            if !value.same(&node.value) {
-                node.value = value;
-                node.changed = epoch;
-            }
+            self.put_value(n, shown(dist, stored));
         }
         if let (Some(new), true) = (new, whitened)
-            && let Some(Side::Choice(c)) = self.nodes[n as usize].side.as_deref_mut()
+            && let Some(Side::Choice(c)) = self.store[n].side.as_deref_mut()
         {
-            self.journal.push(Entry::Choice(n, Box::new(c.clone())));
+            self.update.note(Entry::Choice(n, Box::new(c.clone())));
             c.stored = Some(new);
         }
         Ok(true)
     }
 
     /// [`Graph::update_choice`] for a choice of several elements.
-    fn update_elements(&mut self, code: &Code, n: NodeId, dist: &Dist) -> Result<(), Failure> {
-        let hash = self.choice_hash(code, n);
-        let Some(Side::Choice(side)) = self.nodes[n as usize].side.as_deref() else {
+    fn update_elements(&mut self, n: NodeId, dist: &Dist) -> Result<(), Failure> {
+        let hash = self.choice_hash(n);
+        let Some(Side::Choice(side)) = self.store[n].side.as_deref() else {
             return Ok(());
         };
         let side = side.clone();
         let count = side.elements as usize;
-        let old = self.nodes[n as usize].value.clone();
+        let old = self.store[n].value.clone();
         let mut xs: Vec<Datum> =
             (0..count).filter_map(|i| old.element(i).as_ref().and_then(Value::to_datum)).collect();
-        let changes: SmallVec<[(u32, Change); 4]> = if self.nodes[n as usize].flags & TARGET != 0 {
-            self.pending_of(n).map(|p| (p.element, p.change.clone())).collect()
+        let changes: SmallVec<[(u32, Change); 4]> = if self.store[n].flags & TARGET != 0 {
+            self.update.pending_of(n).map(|p| (p.element, p.change.clone())).collect()
         } else {
             SmallVec::new()
         };
-        let mut changed = false;
         for (element, change) in &changes {
             let range =
                 if *element == NONE { 0..count } else { *element as usize..*element as usize + 1 };
             for i in range {
-                let one = dist.element(i);
-                let new = match change {
-                    Change::Set(d) | Change::Value(d) if *element == NONE => self::element(d, i),
-                    Change::Set(d) => Some(d.clone()),
-                    Change::Value(d) => one.to_noncentred(d),
-                    Change::Free(y) => {
-                        let (x, jacobian) = one.stored_support().from_free(y);
-                        self.jacobian.add(jacobian);
-                        Some(x)
-                    }
-                    Change::Resample => {
-                        Some(self.drawn_now(code, n, &one, element_hash(hash, i))?)
-                    }
-                    Change::White(z) if *element == NONE => {
-                        z.get(i).and_then(|z| one.colour(&[*z]))
-                    }
-                    Change::White(z) => one.colour(z),
-                };
+                let (one, at) = (dist.element(i), element_hash(hash, i));
+                let change =
+                    if *element == NONE { change.of_element(i) } else { Some(change.clone()) };
+                let Some(change) = change else { continue };
+                let new = self.changed(n, &one, &change, Some(at))?;
                 if let (Some(new), Some(x)) = (new, xs.get_mut(i)) {
-                    if matches!(change, Change::Resample | Change::White(_)) {
-                        self.undrawn.add(side.scores[i]);
-                        self.drawn.add(one.log_density_stored(&new));
-                        self.redrawn.push((n, i as u32));
+                    if change.is_from_prior() {
+                        self.score.undrawn.add(side.scores[i]);
+                        self.score.drawn.add(one.log_density_stored(&new));
+                        self.update.redrawn.push((n, i as u32));
                     }
                     *x = new;
-                    changed = true;
                 }
             }
         }
         let scores: Vec<f64> =
             xs.iter().enumerate().map(|(i, x)| dist.element_log_density(i, x)).collect();
-        side.scores.iter().for_each(|s| self.prior.sub(*s));
-        scores.iter().for_each(|s| self.prior.add(*s));
-        self.note(Entry::Choice(n, Box::new(side)));
-        if let Some(Side::Choice(c)) = self.nodes[n as usize].side.as_deref_mut() {
+        side.scores.iter().for_each(|s| self.score.prior.sub(*s));
+        scores.iter().for_each(|s| self.score.prior.add(*s));
+        self.update.note(Entry::Choice(n, Box::new(side)));
+        if let Some(Side::Choice(c)) = self.store[n].side.as_deref_mut() {
             c.scores = scores;
         }
-        let epoch = self.epoch;
-        let node = &mut self.nodes[n as usize];
-        node.flags &= !TARGET;
-        if changed {
-            let value = Value::from_elements(xs.iter().map(Value::from_datum).collect());
-            if !value.same(&node.value) {
-                node.value = value;
-                node.changed = epoch;
-            }
+        self.store[n].flags &= !TARGET;
+        if !changes.is_empty() {
+            self.put_value(n, Value::from_elements(xs.iter().map(Value::from_datum).collect()));
         }
         Ok(())
     }
 
-    /// Returns the stored form of a choice.
-    pub(crate) fn stored(&self, n: NodeId) -> Option<Datum> {
-        match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Choice(ChoiceSide { stored: Some(s), .. })) => Some(s.clone()),
-            _ => self.nodes[n as usize].value.to_datum(),
-        }
+    /// Returns the stored form that a choice or an element of one gets by a change; `None` if
+    /// the change does not fit it.
+    fn changed(
+        &mut self,
+        n: NodeId,
+        dist: &Dist,
+        change: &Change,
+        hash: Option<u64>,
+    ) -> Result<Option<Datum>, Failure> {
+        Ok(match change {
+            Change::Set(d) => Some(d.clone()),
+            Change::Value(d) => dist.to_noncentred(d),
+            Change::Resample => {
+                let hash = hash.unwrap_or_else(|| self.choice_hash(n));
+                Some(self.drawn_now(n, dist, hash)?)
+            }
+            Change::Free(y) => {
+                let support = dist.stored_support();
+                if support.free_dim() != y.len() {
+                    let message = "the choice changed its dimension".to_owned();
+                    return Err(self.fail(n, FaultKind::Domain, message, None));
+                }
+                let (x, jacobian) = support.from_free(y);
+                self.score.jacobian.add(jacobian);
+                Some(x)
+            }
+            Change::White(z) if dist.is_stored_whitened() => Some(Datum::Vec(z.clone().into())),
+            Change::White(z) => dist.colour(z),
+        })
     }
 
-    /// Returns the stored form of a choice as a value of the language.
-    pub(crate) fn stored_value(&self, n: NodeId) -> Value {
-        let node = &self.nodes[n as usize];
-        match node.side.as_deref() {
-            Some(Side::Choice(ChoiceSide { stored: Some(s), .. })) => Value::from_datum(s),
-            _ => node.value.clone(),
+    /// Gives a node a value, which may be the one that it has.
+    fn put_value(&mut self, n: NodeId, value: Value) {
+        let node = &mut self.store[n];
+        if !value.same(&node.value) {
+            node.value = value;
+            node.changed = self.update.epoch;
         }
-    }
-
-    pub(crate) fn is_whitened(&self, n: NodeId) -> bool {
-        matches!(
-            self.nodes[n as usize].side.as_deref(),
-            Some(Side::Choice(ChoiceSide { stored: Some(_), .. }))
-        )
     }
 
     /// Removes a choice that nothing depends on from the score and the register.
-    pub(crate) fn retire_choice(&mut self, code: &Code, n: NodeId) {
-        self.vanished += 1;
-        if self.nodes[n as usize].flags & IMPROPER != 0 {
+    pub(crate) fn retire_choice(&mut self, n: NodeId) {
+        self.update.vanished += 1;
+        if self.store[n].flags & IMPROPER != 0 {
             // It cannot be drawn again: the update is irreversible and has zero weight.
-            self.drawn.add(f64::INFINITY);
+            self.score.drawn.add(f64::INFINITY);
         }
-        let hash = self.choice_hash(code, n);
+        let hash = self.choice_hash(n);
         if let Some(stored) = self.stored(n) {
-            self.removed.push((n, hash, stored));
+            self.update.removed.push((n, hash, stored));
         }
-        match self.nodes[n as usize].side.as_deref() {
+        match self.store[n].side.as_deref() {
             Some(Side::Choice(c)) if c.elements != NONE => {
                 let scores = c.scores.clone();
-                let before = self.journal.iter().find_map(|e| match e {
+                let before = self.update.journal().iter().find_map(|e| match e {
                     Entry::Choice(m, side) if *m == n => Some(side.scores.clone()),
                     _ => None,
                 });
                 let before =
                     before.filter(|b| b.len() == scores.len()).unwrap_or_else(|| scores.clone());
                 for (i, (s, before)) in scores.into_iter().zip(before).enumerate() {
-                    self.prior.sub(s);
-                    self.undrawn.add(if self.redrawn.contains(&(n, i as u32)) {
+                    self.score.prior.sub(s);
+                    self.score.undrawn.add(if self.update.redrawn.contains(&(n, i as u32)) {
                         s
                     } else {
                         before
@@ -508,23 +376,46 @@ impl Graph {
                 }
             }
             _ => {
-                let score = self.nodes[n as usize].score;
-                self.prior.sub(score);
-                self.retired.push((n, score));
+                let score = self.store[n].score;
+                self.score.prior.sub(score);
+                self.update.retired.push((n, score));
             }
         }
-        self.unregister_choice(n, hash);
+        self.choices.unregister(&mut self.update, n, hash);
     }
 
-    fn not_gaussian(&self, code: &Code, n: NodeId) -> Failure {
+    fn not_gaussian(&self, n: NodeId) -> Failure {
         let message = "this choice has no Gaussian prior".to_owned();
         self.fail(
-            code,
             n,
             FaultKind::Type,
             message,
             Some("elliptical moves need normal, mv_normal or gp".into()),
         )
+    }
+}
+
+/// Returns the value of a choice in this stored form.
+fn shown(dist: &Dist, stored: &Datum) -> Value {
+    match dist.is_stored_whitened() {
+        true => Value::from_datum(&dist.from_noncentred(stored)),
+        false => Value::from_datum(stored),
+    }
+}
+
+impl Change {
+    /// True if the new value is one of the prior.
+    fn is_from_prior(&self) -> bool {
+        matches!(self, Change::Resample | Change::White(_))
+    }
+
+    /// Returns what a change of a whole choice is for its element `i`.
+    fn of_element(&self, i: usize) -> Option<Change> {
+        Some(match self {
+            Change::Set(d) | Change::Value(d) => Change::Set(element(d, i)?),
+            Change::White(z) => Change::White(vec![*z.get(i)?]),
+            change => change.clone(),
+        })
     }
 }
 

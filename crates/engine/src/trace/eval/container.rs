@@ -1,12 +1,12 @@
 //! Keyed containers, indexing, and reading a container as a whole.
 
-use crate::lang::code::{Code, Op, Operand, Source, SourceKey};
+use crate::lang::code::{Code, ElementDraw, ElementKey, Op, Operand};
 use crate::lang::error::FaultKind;
 use crate::lang::key::Key;
-use crate::lang::value::{NodeRef, Value};
+use crate::lang::value::Value;
 use crate::trace::graph::Graph;
 use crate::trace::node::*;
-use crate::trace::update::{Failure, Poll};
+use crate::trace::update::{Failure, Poll, Step};
 use indexmap::IndexMap;
 use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
@@ -30,16 +30,16 @@ impl Graph {
         &mut self,
         code: &Code,
         n: NodeId,
-        sources: &[Source],
-    ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
+        sources: &[ElementDraw],
+    ) -> Step {
+        let frame = self.store[n].frame;
         let mut deps = Deps::new();
-        let entries = if let [Source { loops, keys, .. }] = sources
-            && let ([slot], [SourceKey::Loop(0)]) = (&loops[..], &keys[..])
+        let entries = if let [ElementDraw { loops, keys, .. }] = sources
+            && let ([slot], [ElementKey::Loop(0)]) = (&loops[..], &keys[..])
         {
-            let outer = self.frames[frame as usize].base + slot;
-            if self.nodes[outer as usize].state != State::Clean {
-                return self.need(code, outer);
+            let outer = self.store[frame].base + *slot;
+            if self.store[outer].state != State::Clean {
+                return self.need(outer);
             }
             deps.push(outer);
             None
@@ -62,20 +62,19 @@ impl Graph {
             }
             Some(Arc::new(entries))
         };
-        let structure_changed = deps.iter().any(|d| self.nodes[*d as usize].changed == self.epoch);
-        let keep = self.nodes[n as usize].flags & WAS_STALE != 0 && !structure_changed;
-        let held = self.nodes[n as usize].flags & HELD != 0;
+        let structure_changed = deps.iter().any(|d| self.store[*d].changed == self.update.epoch);
+        let keep = self.store[n].flags & WAS_STALE != 0 && !structure_changed;
+        let held = self.store[n].flags & HELD != 0;
         if held {
             deps.iter().for_each(|d| self.acquire(*d, n, true));
         }
-        self.let_side_go(code, n);
+        self.let_side_go(n);
         self.set_side(n, Some(Side::Table(Table { deps, entries })));
         if keep {
-            return Ok(self.finish_unchanged(code, n));
+            return Ok(self.finish_unchanged(n));
         }
-        self.version += 1;
-        let version = self.version;
-        Ok(self.finish(code, n, Value::Container(NodeRef { node: n, version })))
+        let made = self.store.new_version(n);
+        Ok(self.finish(n, Value::Container(made)))
     }
 
     /// Walks the loops of a source and adds each key.
@@ -85,24 +84,21 @@ impl Graph {
         code: &Code,
         n: NodeId,
         frame: FrameId,
-        source: &Source,
+        source: &ElementDraw,
         index: u32,
         passes: &mut SmallVec<[u32; 2]>,
         deps: &mut Deps,
         entries: &mut IndexMap<SmallVec<[Key; 1]>, Element>,
     ) -> Result<Option<Poll>, Failure> {
         if let Some(slot) = source.loops.get(passes.len()) {
-            let node = self.frames[frame as usize].base + slot;
-            if self.nodes[node as usize].state != State::Clean {
-                return self.need(code, node).map(Some);
+            let node = self.store[frame].base + *slot;
+            if self.store[node].state != State::Clean {
+                return self.need(node).map(Some);
             }
             deps.push(node);
-            let count = match self.nodes[node as usize].side.as_deref() {
-                Some(Side::Loop(l)) => l.frames.len(),
-                _ => 0,
-            };
+            let count = self.loop_of(node).map_or(0, |l| l.frames.len());
             for i in 0..count {
-                let inner = self.pass_frame(code, node, i)?;
+                let inner = self.pass_frame(node, i)?;
                 passes.push(i as u32);
                 let step = self.walk(code, n, inner, source, index, passes, deps, entries)?;
                 passes.pop();
@@ -115,22 +111,22 @@ impl Graph {
         let mut keys: SmallVec<[Key; 1]> = SmallVec::new();
         for k in &source.keys {
             let key = match k {
-                SourceKey::Loop(level) => {
+                ElementKey::Loop(level) => {
                     let mut f = frame;
                     for _ in *level as usize + 1..source.loops.len() {
-                        f = self.nodes[self.frames[f as usize].owner as usize].frame;
+                        f = self.store[self.store[f].owner].frame;
                     }
-                    let key = self.frames[f as usize].key.clone();
+                    let key = self.store[f].key.clone();
                     key.ok_or_else(|| {
-                        self.type_error(code, n, "this iteration of the loop has no key".into())
+                        self.type_error(n, "this iteration of the loop has no key".into())
                     })?
                 }
-                SourceKey::Operand(o) => {
+                ElementKey::Operand(o) => {
                     if let Some(m) = self.unready(frame, *o) {
-                        return self.need(code, m).map(Some);
+                        return self.need(m).map(Some);
                     }
                     deps.extend(self.resolve(frame, *o));
-                    Key::of(self.value(code, frame, *o)).map_err(|f| self.fault(code, n, f))?
+                    Key::of(self.value(frame, *o)).map_err(|f| self.fault(n, f))?
                 }
             };
             keys.push(key);
@@ -138,45 +134,42 @@ impl Graph {
         let element = Element { source: index, passes: passes.clone() };
         if entries.insert(keys.clone(), element).is_some() {
             let shown = keys.iter().map(|k| format!("[{k}]")).collect::<String>();
-            let Op::Container { name, .. } = self.op(code, n) else { return Ok(None) };
+            let Op::Container { name, .. } = self.op(n) else { return Ok(None) };
             let message = format!("`{name}{shown}` is drawn twice");
             let hint = "every iteration of the loop needs its own key".to_owned();
-            return Err(self.fail(code, n, FaultKind::Duplicate, message, Some(hint)));
+            return Err(self.fail(n, FaultKind::Duplicate, message, Some(hint)));
         }
         Ok(None)
     }
 
     /// Finds the element of a container for a key.
     fn find(&mut self, code: &Code, container: NodeId, keys: &[Key]) -> Result<Found, Failure> {
-        match self.nodes[container as usize].side.as_deref() {
+        match self.store[container].side.as_deref() {
             Some(Side::Loop(l)) => {
                 let [key] = keys else { return Ok(Found::Missing) };
                 // Results of a map over names can be indexed by name and by position.
                 let pass =
                     l.keys.find(key).or_else(|| key.as_index().filter(|i| *i < l.keys.len()));
                 let Some(pass) = pass else { return Ok(Found::Missing) };
-                self.map_result(code, container, pass).map(Found::Place)
+                self.map_result(container, pass).map(Found::Place)
             }
             Some(Side::Table(Table { entries: None, .. })) => {
-                let Op::Container { sources, .. } = self.op(code, container) else {
+                let Op::Container { sources, .. } = self.op(container) else {
                     return Ok(Found::Missing);
                 };
                 let ([key], source) = (keys, &sources[0]) else { return Ok(Found::Missing) };
-                let outer = self.frames[self.nodes[container as usize].frame as usize].base
-                    + source.loops[0];
-                let pass = match self.nodes[outer as usize].side.as_deref() {
-                    Some(Side::Loop(l)) => l.keys.find(key),
-                    _ => None,
-                };
+                let outer = self.store[self.store[container].frame].base + source.loops[0];
+                let draw = source.draw;
+                let pass = self.loop_of(outer).and_then(|l| l.keys.find(key));
                 let Some(pass) = pass else { return Ok(Found::Missing) };
-                let f = self.pass_frame(code, outer, pass)?;
-                Ok(Found::Place(Place::Node(self.frames[f as usize].base + source.draw)))
+                let f = self.pass_frame(outer, pass)?;
+                Ok(Found::Place(Place::Node(self.store[f].base + draw)))
             }
             Some(Side::Table(Table { entries: Some(entries), .. })) => {
                 let Some(element) = entries.get(keys).cloned() else { return Ok(Found::Missing) };
                 self.element_node(code, container, &element).map(|n| Found::Place(Place::Node(n)))
             }
-            _ => self.need(code, container).map(Found::Pending),
+            _ => self.need(container).map(Found::Pending),
         }
     }
 
@@ -187,20 +180,22 @@ impl Graph {
         container: NodeId,
         element: &Element,
     ) -> Result<NodeId, Failure> {
-        let Op::Container { sources, .. } = self.op(code, container) else { return Ok(container) };
+        let Op::Container { sources, .. } = &code.ops[self.store[container].op] else {
+            return Ok(container);
+        };
         let source = &sources[element.source as usize];
-        let mut frame = self.nodes[container as usize].frame;
+        let mut frame = self.store[container].frame;
         for (slot, pass) in source.loops.iter().zip(&element.passes) {
-            let outer = self.frames[frame as usize].base + slot;
-            frame = self.pass_frame(code, outer, *pass as usize)?;
+            let outer = self.store[frame].base + *slot;
+            frame = self.pass_frame(outer, *pass as usize)?;
         }
-        Ok(self.frames[frame as usize].base + source.draw)
+        Ok(self.store[frame].base + source.draw)
     }
 
     /// Returns the location of the result of a pass of a `map`.
-    fn map_result(&mut self, code: &Code, owner: NodeId, pass: usize) -> Result<Place, Failure> {
-        let f = self.pass_frame(code, owner, pass)?;
-        let result = code.blocks[self.frames[f as usize].block as usize].result;
+    fn map_result(&mut self, owner: NodeId, pass: usize) -> Result<Place, Failure> {
+        let f = self.pass_frame(owner, pass)?;
+        let result = self.code.blocks[self.store[f].block].result;
         Ok(match result {
             Some(o) => self.resolve(f, o).map_or(Place::Constant(o), Place::Node),
             None => Place::Constant(Operand::Const(0)),
@@ -208,24 +203,24 @@ impl Graph {
     }
 
     /// Reads all elements of the container in the preceding slot.
-    pub(super) fn evaluate_gather(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let container = n - 1;
-        if self.nodes[container as usize].state != State::Clean {
-            return self.need(code, container);
+    pub(super) fn evaluate_gather(&mut self, code: &Code, n: NodeId) -> Step {
+        let container = n.container();
+        if self.store[container].state != State::Clean {
+            return self.need(container);
         }
         let mut places: Vec<(Option<Key>, Place)> = Vec::new();
-        match self.nodes[container as usize].side.as_deref() {
+        match self.store[container].side.as_deref() {
             Some(Side::Loop(l)) => {
                 let keys = l.keys.clone();
                 let named = matches!(&keys, Keys::Listed { keys, .. } if keys.iter().all(|k| matches!(k, Key::Str(_))));
                 for i in 0..keys.len() {
-                    places.push((named.then(|| keys.get(i)), self.map_result(code, container, i)?));
+                    places.push((named.then(|| keys.get(i)), self.map_result(container, i)?));
                 }
             }
             Some(Side::Table(t)) => {
                 let entries = match &t.entries {
                     Some(e) => Arc::clone(e),
-                    None => Arc::new(self.single_loop_entries(code, container)),
+                    None => Arc::new(self.single_loop_entries(container)),
                 };
                 let mut sorted: Vec<_> = entries.iter().collect();
                 let names = sorted.iter().all(|(k, _)| matches!(k.last(), Some(Key::Str(_))));
@@ -243,10 +238,10 @@ impl Graph {
         let mut deps: Deps = smallvec![];
         for (_, p) in &places {
             let Place::Node(m) = p else { continue };
-            match self.nodes[*m as usize].state {
+            match self.store[*m].state {
                 State::Clean => {}
                 _ => {
-                    self.need(code, *m)?;
+                    self.need(*m)?;
                     waiting = true;
                 }
             }
@@ -259,23 +254,23 @@ impl Graph {
         let mut nested: Deps = smallvec![];
         for (_, p) in &places {
             let v = match p {
-                Place::Node(m) => &self.nodes[*m as usize].value,
-                Place::Constant(Operand::Const(i)) => code.const_value(*i),
+                Place::Node(m) => &self.store[*m].value,
+                Place::Constant(Operand::Const(i)) => self.code.const_value(*i),
                 Place::Constant(_) => &Value::Unit,
             };
             if let Value::Container(r) = v {
-                nested.push(r.node + 1);
+                nested.push(r.node.gather());
             }
             values.push(v.clone());
         }
         for m in &nested {
-            if self.nodes[*m as usize].state != State::Clean {
-                return self.need(code, *m);
+            if self.store[*m].state != State::Clean {
+                return self.need(*m);
             }
         }
         for v in &mut values {
             if let Value::Container(r) = v {
-                *v = self.nodes[r.node as usize + 1].value.clone();
+                *v = self.store[r.node.gather()].value.clone();
             }
         }
         deps.extend(nested);
@@ -291,21 +286,16 @@ impl Graph {
             _ => Value::from_elements(values),
         };
         self.set_deps(n, deps);
-        self.finish_made(code, n, value)
+        self.finish_made(n, value)
     }
 
     /// Returns the entries of a container whose keys are those of its single loop.
-    fn single_loop_entries(
-        &self,
-        code: &Code,
-        container: NodeId,
-    ) -> IndexMap<SmallVec<[Key; 1]>, Element> {
-        let Op::Container { sources, .. } = self.op(code, container) else {
+    fn single_loop_entries(&self, container: NodeId) -> IndexMap<SmallVec<[Key; 1]>, Element> {
+        let Op::Container { sources, .. } = self.op(container) else {
             return IndexMap::new();
         };
-        let outer =
-            self.frames[self.nodes[container as usize].frame as usize].base + sources[0].loops[0];
-        match self.nodes[outer as usize].side.as_deref() {
+        let outer = self.store[self.store[container].frame].base + sources[0].loops[0];
+        match self.store[outer].side.as_deref() {
             Some(Side::Loop(l)) => (0..l.keys.len())
                 .map(|i| {
                     (smallvec![l.keys.get(i)], Element { source: 0, passes: smallvec![i as u32] })
@@ -321,61 +311,61 @@ impl Graph {
         n: NodeId,
         base: Operand,
         keys: &[Operand],
-    ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
-        if let Some(step) = self.await_all(code, frame, &[base])? {
+    ) -> Step {
+        let frame = self.store[n].frame;
+        if let Some(step) = self.await_all(frame, &[base])? {
             return Ok(step);
         }
         let mut deps = Deps::new();
         let mut rest: SmallVec<[Value; 2]> = SmallVec::new();
-        let read = self.inputs(code, frame, keys, &mut deps);
+        let read = self.inputs(frame, keys, &mut deps);
         if let Err(m) = read.map(|values| values.iter().for_each(|v| rest.push(Value::clone(v)))) {
-            return self.need(code, m);
+            return self.need(m);
         }
-        if let Some(m) = self.element_read_before(code, n, base, keys) {
-            if self.nodes[m as usize].state != State::Clean {
-                return self.need(code, m);
+        if let Some(m) = self.element_read_before(n, base, keys) {
+            if self.store[m].state != State::Clean {
+                return self.need(m);
             }
-            let value = self.nodes[m as usize].value.clone();
-            return Ok(self.finish(code, n, value));
+            let value = self.store[m].value.clone();
+            return Ok(self.finish(n, value));
         }
-        let mut value = self.value(code, frame, base).clone();
+        let mut value = self.value(frame, base).clone();
         while !rest.is_empty() {
             if let Value::Container(r) = value {
                 let container = r.node;
-                if self.nodes[container as usize].state != State::Clean {
-                    return self.need(code, container);
+                if self.store[container].state != State::Clean {
+                    return self.need(container);
                 }
                 if matches!(rest[0], Value::Array(_) | Value::List(_)) {
                     // Several elements at once: read the container as a whole.
-                    if self.nodes[container as usize + 1].state != State::Clean {
-                        return self.need(code, container + 1);
+                    if self.store[container.gather()].state != State::Clean {
+                        return self.need(container.gather());
                     }
-                    deps.push(container + 1);
-                    value = self.nodes[container as usize + 1].value.clone();
+                    deps.push(container.gather());
+                    value = self.store[container.gather()].value.clone();
                     continue;
                 }
-                let width = self.key_width(code, container).min(rest.len());
+                let width = self.key_width(container).min(rest.len());
                 let found: Option<SmallVec<[Key; 2]>> =
                     rest[..width].iter().map(Key::from_value).collect();
                 let Some(found) = found else {
                     let message = format!("{} cannot be a key", rest[0].type_name());
-                    return Err(self.type_error(code, n, message));
+                    return Err(self.type_error(n, message));
                 };
                 let place = match self.find(code, container, &found)? {
                     Found::Place(p) => p,
                     Found::Pending(step) => return Ok(step),
-                    Found::Missing => return Err(self.missing(code, n, container, &found)),
+                    Found::Missing => return Err(self.missing(n, container, &found)),
                 };
                 value = match place {
-                    Place::Constant(Operand::Const(i)) => code.const_value(i).clone(),
+                    Place::Constant(Operand::Const(i)) => self.code.const_value(i).clone(),
                     Place::Constant(_) => Value::Unit,
                     Place::Node(m) => {
-                        if self.nodes[m as usize].state != State::Clean {
-                            return self.need(code, m);
+                        if self.store[m].state != State::Clean {
+                            return self.need(m);
                         }
                         deps.push(m);
-                        self.nodes[m as usize].value.clone()
+                        self.store[m].value.clone()
                     }
                 };
                 rest.drain(..width);
@@ -383,47 +373,33 @@ impl Graph {
                 let key = rest.remove(0);
                 value = match index_value(&value, &key) {
                     Ok(v) => v,
-                    Err(f) => return Err(self.fault(code, n, f)),
+                    Err(f) => return Err(self.fault(n, f)),
                 };
             }
         }
         self.set_deps(n, deps);
-        Ok(self.finish(code, n, value))
+        Ok(self.finish(n, value))
     }
 
     /// Returns the element of a container that a node read before, if container and keys
     /// are unchanged.
-    fn element_read_before(
-        &self,
-        code: &Code,
-        n: NodeId,
-        base: Operand,
-        keys: &[Operand],
-    ) -> Option<NodeId> {
-        let node = &self.nodes[n as usize];
-        let Value::Container(r) = self.value(code, node.frame, base) else { return None };
+    fn element_read_before(&self, n: NodeId, base: Operand, keys: &[Operand]) -> Option<NodeId> {
+        let node = &self.store[n];
+        let Value::Container(r) = self.value(node.frame, base) else { return None };
         let Some(Side::Deps(deps)) = node.side.as_deref() else { return None };
         let as_it_was = |d: NodeId| {
-            let d = &self.nodes[d as usize];
-            d.state == State::Clean && d.changed != self.epoch
+            let d = &self.store[d];
+            d.state == State::Clean && d.changed != self.update.epoch
         };
         let all = keys.iter().chain([&base]).filter_map(|o| self.resolve(node.frame, *o));
         let same =
             node.flags & WAS_STALE != 0 && as_it_was(r.node) && all.into_iter().all(as_it_was);
-        (same && deps.len() == 1 && deps[0] != r.node + 1).then(|| deps[0])
+        (same && deps.len() == 1 && deps[0] != r.node.gather()).then(|| deps[0])
     }
 
-    /// Returns the number of keys of an element of a container.
-    pub(crate) fn key_width(&self, code: &Code, container: NodeId) -> usize {
-        match self.op(code, container) {
-            Op::Container { sources, .. } => sources[0].keys.len(),
-            _ => 1,
-        }
-    }
-
-    fn missing(&self, code: &Code, n: NodeId, container: NodeId, keys: &[Key]) -> Failure {
+    fn missing(&self, n: NodeId, container: NodeId, keys: &[Key]) -> Failure {
         let shown = keys.iter().map(|k| format!("[{k}]")).collect::<String>();
-        let known: Vec<String> = match self.nodes[container as usize].side.as_deref() {
+        let known: Vec<String> = match self.store[container].side.as_deref() {
             Some(Side::Loop(l)) => {
                 (0..l.keys.len().min(100)).map(|i| l.keys.get(i).to_string()).collect()
             }
@@ -433,7 +409,7 @@ impl Graph {
                 .map(|k| k.iter().map(Key::to_string).collect::<Vec<_>>().join("]["))
                 .collect(),
             _ => {
-                let entries = self.single_loop_entries(code, container);
+                let entries = self.single_loop_entries(container);
                 entries
                     .keys()
                     .take(100)
@@ -452,11 +428,11 @@ impl Graph {
                 _ => Some("it has no elements".into()),
             },
         };
-        let what = match self.op(code, container) {
+        let what = match self.op(container) {
             Op::Container { name, .. } => format!("`{name}`"),
             _ => "the result of this map".into(),
         };
-        self.fail(code, n, FaultKind::Index, format!("{what} has no element {shown}"), hint)
+        self.fail(n, FaultKind::Index, format!("{what} has no element {shown}"), hint)
     }
 }
 

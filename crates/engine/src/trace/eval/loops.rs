@@ -1,70 +1,61 @@
 //! `for`, `map` and `fold`: one frame per pass, created on demand.
 
-use crate::lang::code::{BlockKind, Code, Op, Operand};
+use crate::lang::code::{BlockKind, Op, Operand};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::key::Key;
-use crate::lang::value::{NodeRef, Value};
+use crate::lang::value::Value;
 use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
-use crate::trace::update::{Failure, Poll};
+use crate::trace::update::{Failure, Step};
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
 impl Graph {
     /// Evaluates the element of a pass.
-    pub(super) fn evaluate_item(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let frame = &self.frames[self.nodes[n as usize].frame as usize];
+    pub(super) fn evaluate_item(&mut self, n: NodeId) -> Step {
+        let frame = &self.store[self.store[n].frame];
         let (owner, pass) = (frame.owner, frame.pass as usize);
-        if self.nodes[owner as usize].state == State::Stale {
-            return self.need(code, owner);
+        if self.store[owner].state == State::Stale {
+            return self.need(owner);
         }
-        let value = match self.nodes[owner as usize].side.as_deref() {
-            Some(Side::Loop(l)) => l.items.element(pass).unwrap_or_default(),
-            _ => Value::Unit,
-        };
-        Ok(self.finish(code, n, value))
+        let value = self.loop_of(owner).and_then(|l| l.items.element(pass)).unwrap_or_default();
+        Ok(self.finish(n, value))
     }
 
     /// Evaluates the running value of a `fold` before a pass.
-    pub(super) fn evaluate_accumulator(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let frame = &self.frames[self.nodes[n as usize].frame as usize];
+    pub(super) fn evaluate_accumulator(&mut self, n: NodeId) -> Step {
+        let frame = &self.store[self.store[n].frame];
         let (owner, pass) = (frame.owner, frame.pass as usize);
-        let home = self.nodes[owner as usize].frame;
+        let home = self.store[owner].frame;
         let (from, operand) = if pass == 0 {
-            let Op::Fold { init, .. } = self.op(code, owner) else {
-                return Ok(self.finish(code, n, Value::Unit));
+            let Op::Fold { init, .. } = self.op(owner) else {
+                return Ok(self.finish(n, Value::Unit));
             };
             (home, *init)
         } else {
-            let previous = self.pass_frame(code, owner, pass - 1)?;
-            match code.blocks[self.frames[previous as usize].block as usize].result {
+            let previous = self.pass_frame(owner, pass - 1)?;
+            match self.code.blocks[self.store[previous].block].result {
                 Some(r) => (previous, r),
-                None => return Ok(self.finish(code, n, Value::Unit)),
+                None => return Ok(self.finish(n, Value::Unit)),
             }
         };
         if let Some(m) = self.unready(from, operand) {
-            return self.need(code, m);
+            return self.need(m);
         }
-        let value = self.value(code, from, operand).clone();
+        let value = self.value(from, operand).clone();
         self.set_deps(n, self.resolve(from, operand).into_iter().collect());
-        Ok(self.finish(code, n, value))
+        Ok(self.finish(n, value))
     }
 
-    pub(super) fn evaluate_for(
-        &mut self,
-        code: &Code,
-        n: NodeId,
-        iter: Operand,
-        body: u32,
-    ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
-        if let Some(step) = self.await_plain(code, n, frame, &[iter])? {
+    pub(super) fn evaluate_for(&mut self, n: NodeId, iter: Operand, body: BlockId) -> Step {
+        let frame = self.store[n].frame;
+        if let Some(step) = self.await_plain(frame, &[iter])? {
             return Ok(step);
         }
         let mut deps = Deps::new();
-        let over = self.plain(code, frame, iter, &mut deps);
+        let over = self.plain(frame, iter, &mut deps);
         let (items, keys) = match over {
             Value::Record(r) => {
                 let names: Vec<Value> = r.keys().map(|k| Value::Str(Arc::clone(k))).collect();
@@ -78,46 +69,36 @@ impl Graph {
                     "`for` iterates over an array, a range or a record, not over {}",
                     v.type_name()
                 );
-                return Err(self.type_error(code, n, message));
+                return Err(self.type_error(n, message));
             }
         };
-        let keys = keys.map_err(|e| self.fault(code, n, e))?;
-        self.set_loop(code, n, keys, items, body, frame, deps)?;
-        if self.slot_facts(code, n).is_effect {
-            self.make_all_passes(code, n)?;
+        let keys = keys.map_err(|e| self.fault(n, e))?;
+        self.set_loop(n, keys, items, body, frame, deps)?;
+        if self.slot_facts(n).is_effect {
+            self.make_all_passes(n)?;
         }
-        Ok(self.finish_structure(code, n))
+        Ok(self.finish_unchanged(n))
     }
 
-    pub(super) fn evaluate_map(
-        &mut self,
-        code: &Code,
-        n: NodeId,
-        f: Operand,
-        over: Operand,
-        _site: u32,
-    ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
-        if let Some(step) = self.await_all(code, frame, &[f])? {
-            return Ok(step);
-        }
-        if let Some(step) = self.await_plain(code, n, frame, &[over])? {
+    pub(super) fn evaluate_map(&mut self, n: NodeId, f: Operand, over: Operand) -> Step {
+        let frame = self.store[n].frame;
+        if let Some(step) = self.await_plain(frame, &[f, over])? {
             return Ok(step);
         }
         let mut deps = Deps::new();
-        let xs = self.plain(code, frame, over, &mut deps);
+        let xs = self.plain(frame, over, &mut deps);
         let (items, keys) = match map_keys(xs) {
             Ok(pair) => pair,
-            Err(e) => return Err(self.fault(code, n, e)),
+            Err(e) => return Err(self.fault(n, e)),
         };
-        let (block, parent) = match self.value(code, frame, f) {
+        let (block, parent) = match self.value(frame, f) {
             Value::Closure(c) => (c.block, c.frame),
             Value::Builtin(i) => {
-                let builtin = code.builtins.get(*i);
+                let builtin = self.code.builtins.get(*i);
                 let results: Result<Vec<Value>, Fault> = (0..keys.len())
                     .map(|i| builtin.apply(&[&items.element(i).unwrap_or_default()]))
                     .collect();
-                let results = results.map_err(|e| self.fault(code, n, e))?;
+                let results = results.map_err(|e| self.fault(n, e))?;
                 let value = match keys {
                     Keys::Listed { ref keys, .. } if matches!(xs, Value::Record(_)) => {
                         let names = keys.iter().map(|k| Arc::from(k.to_string()));
@@ -125,105 +106,71 @@ impl Graph {
                     }
                     _ => Value::from_elements(results),
                 };
-                if matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Loop(_))) {
-                    self.let_side_go(code, n);
+                if matches!(self.store[n].side.as_deref(), Some(Side::Loop(_))) {
+                    self.let_side_go(n);
                 }
                 self.set_deps(n, deps);
-                return self.finish_made(code, n, value);
+                return self.finish_made(n, value);
             }
             v => {
                 let message = format!("map: needs a function, got {}", v.type_name());
                 let hint =
                     matches!(v, Value::Memo(_)).then(|| "wrap it: fn(x) { f(x) }".to_owned());
-                return Err(self.fail(code, n, FaultKind::Type, message, hint));
+                return Err(self.fail(n, FaultKind::Type, message, hint));
             }
         };
-        self.check_callback(code, n, "map", block, 1)?;
-        self.set_loop(code, n, keys, items, block, parent, deps)?;
-        if self.slot_facts(code, n).is_effect {
-            self.make_all_passes(code, n)?;
+        self.check_callback(n, "map", block, 1)?;
+        self.set_loop(n, keys, items, block, parent, deps)?;
+        if self.slot_facts(n).is_effect {
+            self.make_all_passes(n)?;
         }
-        Ok(self.finish_structure(code, n))
+        Ok(self.finish_unchanged(n))
     }
 
     pub(super) fn evaluate_fold(
         &mut self,
-        code: &Code,
         n: NodeId,
         f: Operand,
         init: Operand,
         over: Operand,
-        _site: u32,
-    ) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
-        if let Some(step) = self.await_all(code, frame, &[f])? {
-            return Ok(step);
-        }
-        if let Some(step) = self.await_plain(code, n, frame, &[over])? {
+    ) -> Step {
+        let frame = self.store[n].frame;
+        if let Some(step) = self.await_plain(frame, &[f, over])? {
             return Ok(step);
         }
         let mut deps = Deps::new();
-        let (items, keys) = match map_keys(self.plain(code, frame, over, &mut deps)) {
+        let (items, keys) = match map_keys(self.plain(frame, over, &mut deps)) {
             Ok(pair) => pair,
-            Err(e) => return Err(self.fault(code, n, e)),
+            Err(e) => return Err(self.fault(n, e)),
         };
-        let (block, parent) = match self.value(code, frame, f) {
+        let (block, parent) = match self.value(frame, f) {
             Value::Closure(c) => (c.block, c.frame),
             v => {
                 let message =
                     format!("fold: needs a function defined in the program, got {}", v.type_name());
-                return Err(self.type_error(code, n, message));
+                return Err(self.type_error(n, message));
             }
         };
-        self.check_callback(code, n, "fold", block, 2)?;
-        self.set_loop(code, n, keys, items, block, parent, deps)?;
-        let passes = match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Loop(l)) => l.frames.len(),
-            _ => 0,
+        self.check_callback(n, "fold", block, 2)?;
+        self.set_loop(n, keys, items, block, parent, deps)?;
+        let passes = self.loop_of(n).map_or(0, |l| l.frames.len());
+        let Some(last) = passes.checked_sub(1) else {
+            return self.take_operand(n, frame, init);
         };
-        let (from, operand) = match passes.checked_sub(1) {
-            None => (frame, Some(init)),
-            Some(last) => {
-                // All passes must exist, so that a change propagates from each to the
-                // next.
-                self.make_all_passes(code, n)?;
-                let f = self.pass_frame(code, n, last)?;
-                (f, code.blocks[self.frames[f as usize].block as usize].result)
-            }
-        };
-        let Some(operand) = operand else { return Ok(self.finish(code, n, Value::Unit)) };
-        if let Some(m) = self.unready(from, operand) {
-            return self.need(code, m);
-        }
-        let value = self.value(code, from, operand).clone();
-        let result = self.resolve(from, operand).unwrap_or(NONE);
-        if let Some(Side::Loop(l)) = self.nodes[n as usize].side.as_deref()
-            && l.result != result
-        {
-            let mut l = l.clone();
-            if self.nodes[n as usize].flags & HELD != 0 {
-                if result != NONE {
-                    self.acquire(result, n, true);
-                }
-                if l.result != NONE {
-                    self.release(l.result, true);
-                }
-            }
-            l.result = result;
-            self.set_side(n, Some(Side::Loop(l)));
-        }
-        Ok(self.finish(code, n, value))
+        // All passes must exist, so that a change propagates from each to the next.
+        self.make_all_passes(n)?;
+        let last = self.pass_frame(n, last)?;
+        self.take_result(n, last)
     }
 
     fn check_callback(
         &self,
-        code: &Code,
         n: NodeId,
         what: &str,
-        block: u32,
+        block: BlockId,
         takes: usize,
     ) -> Result<(), Failure> {
-        match code.blocks[block as usize].signature() {
+        match self.code.blocks[block].signature() {
             Some((_, params, required)) if params.len() >= takes && required <= takes => Ok(()),
             Some((name, params, _)) => {
                 let message = format!(
@@ -231,9 +178,9 @@ impl Graph {
                     super::call::count(takes, "argument"),
                     params.len()
                 );
-                Err(self.type_error(code, n, message))
+                Err(self.type_error(n, message))
             }
-            None => Err(self.type_error(code, n, format!("{what}: needs a function"))),
+            None => Err(self.type_error(n, format!("{what}: needs a function"))),
         }
     }
 
@@ -241,19 +188,18 @@ impl Graph {
     #[allow(clippy::too_many_arguments)]
     fn set_loop(
         &mut self,
-        code: &Code,
         n: NodeId,
         keys: Keys,
         items: Value,
-        block: u32,
+        block: BlockId,
         parent: FrameId,
         deps: Deps,
     ) -> Result<(), Failure> {
-        let held = self.nodes[n as usize].flags & HELD != 0;
-        let old = match self.nodes[n as usize].side.as_deref() {
+        let held = self.store[n].flags & HELD != 0;
+        let old = match self.store[n].side.as_deref() {
             Some(Side::Loop(l)) => Some(l.clone()),
             _ => {
-                self.let_side_go(code, n);
+                self.let_side_go(n);
                 None
             }
         };
@@ -270,22 +216,21 @@ impl Graph {
             }
             return Ok(());
         }
-        let mut frames = vec![NONE; keys.len()];
-        let mut result = NONE;
+        let mut frames = vec![FrameId::NONE; keys.len()];
+        let mut result = NodeId::NONE;
         if held {
             deps.iter().for_each(|d| self.acquire(*d, n, true));
         }
         if let Some(old) = old {
             let same = (old.block, old.parent) == (block, parent);
-            for (i, f) in old.frames.iter().enumerate().filter(|(_, f)| **f != NONE) {
+            for (i, f) in old.frames.iter().enumerate().filter(|(_, f)| **f != FrameId::NONE) {
                 match keys.find(&old.keys.get(i)).filter(|_| same) {
                     Some(j) => {
                         frames[j] = *f;
-                        let before =
-                            std::mem::replace(&mut self.frames[*f as usize].pass, j as u32);
-                        self.note(Entry::PassMoved(*f, before));
+                        let before = std::mem::replace(&mut self.store[*f].pass, j as u32);
+                        self.update.note(Entry::PassMoved(*f, before));
                     }
-                    None => self.detach(code, *f),
+                    None => self.detach(*f),
                 }
             }
             if held {
@@ -297,85 +242,69 @@ impl Graph {
             n,
             Some(Side::Loop(Loop { keys, items, frames, block, parent, result, deps })),
         );
-        self.version += 1;
-        let version = self.version;
-        if let Some(Side::Loop(_)) = self.nodes[n as usize].side.as_deref()
-            && !matches!(self.op(code, n), Op::Fold { .. })
+        let made = self.store.new_version(n);
+        if let Some(Side::Loop(_)) = self.store[n].side.as_deref()
+            && !matches!(self.op(n), Op::Fold { .. })
         {
             // The value is a reference with the new version, so that users see that the
             // structure changed.
-            let node = &mut self.nodes[n as usize];
-            node.value = Value::Container(NodeRef { node: n, version });
-            node.changed = self.epoch;
+            let node = &mut self.store[n];
+            node.value = Value::Container(made);
+            node.changed = self.update.epoch;
         }
         Ok(())
     }
 
-    /// Ends the evaluation of a node whose value is a reference to its structure.
-    fn finish_structure(&mut self, code: &Code, n: NodeId) -> Poll {
-        self.finish_unchanged(code, n)
-    }
-
-    fn make_all_passes(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
-        let passes = match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Loop(l)) => l.frames.len(),
-            _ => 0,
-        };
+    fn make_all_passes(&mut self, n: NodeId) -> Result<(), Failure> {
+        let passes = self.loop_of(n).map_or(0, |l| l.frames.len());
         for i in 0..passes {
-            self.pass_frame(code, n, i)?;
+            self.pass_frame(n, i)?;
         }
         Ok(())
     }
 
     /// Returns the frame of a pass, which is created on first use.
-    pub(crate) fn pass_frame(
-        &mut self,
-        code: &Code,
-        owner: NodeId,
-        pass: usize,
-    ) -> Result<FrameId, Failure> {
-        let Some(Side::Loop(l)) = self.nodes[owner as usize].side.as_deref() else {
+    pub(crate) fn pass_frame(&mut self, owner: NodeId, pass: usize) -> Result<FrameId, Failure> {
+        let Some(Side::Loop(l)) = self.store[owner].side.as_deref() else {
             return Err(self.fail(
-                code,
                 owner,
                 FaultKind::Index,
                 "this loop has no iterations".into(),
                 None,
             ));
         };
-        if l.frames[pass] != NONE {
+        if l.frames[pass] != FrameId::NONE {
             return Ok(l.frames[pass]);
         }
         let (block, parent, key) = (l.block, l.parent, l.keys.get(pass));
-        let home = self.nodes[owner as usize].frame;
-        let here = &self.frames[home as usize];
-        let (path, depth, args) = match self.op(code, owner) {
+        let home = self.store[owner].frame;
+        let here = &self.store[home];
+        let (path, depth, args) = match self.op(owner) {
             Op::Map { site, .. } => {
-                (self.keyed_site_hash(code, home, *site, &key), here.depth + 1, Arguments::Item)
+                (self.keyed_site_hash(home, *site, &key), here.depth + 1, Arguments::Item)
             }
             Op::Fold { site, .. } => {
-                (self.keyed_site_hash(code, home, *site, &key), here.depth + 1, Arguments::Fold)
+                (self.keyed_site_hash(home, *site, &key), here.depth + 1, Arguments::Fold)
             }
             _ => (here.path, here.depth, Arguments::None),
         };
-        debug_assert!(!matches!(code.blocks[block as usize].kind, BlockKind::Root));
+        debug_assert!(!matches!(self.code.blocks[block].kind, BlockKind::Root));
         let frame = Frame {
             block,
             parent,
             owner,
-            base: 0,
             path,
             depth,
             pass: pass as u32,
             key: Some(key),
             args,
-            attached: true,
+            ..Frame::default()
         };
-        let f = self.make_frame(code, frame)?;
-        if let Some(Side::Loop(l)) = self.nodes[owner as usize].side.as_deref_mut() {
+        let f = self.make_frame(frame)?;
+        if let Some(Side::Loop(l)) = self.store[owner].side.as_deref_mut() {
             l.frames[pass] = f;
         }
-        self.note(Entry::PassMade(owner, pass as u32));
+        self.update.note(Entry::PassMade(owner, pass as u32));
         Ok(f)
     }
 }

@@ -1,107 +1,100 @@
-//! Evaluation of one node, by kind of operation; one file per family of operations.
+//! Evaluation of one node, by kind of operation; one file per family of operations, and
+//! here observations and factors.
 
 mod call;
 pub(crate) mod choice;
 mod container;
 mod loops;
-mod observe;
-
-pub(crate) use observe::Score;
 
 use super::graph::Graph;
+use super::journal::Entry;
 use super::node::*;
-use super::update::{Failure, Poll};
+use super::update::{Failure, Poll, Step};
 use crate::lang::builtins::{Builtin, PreviousEvaluation};
-use crate::lang::code::{Code, Op, Operand};
+use crate::lang::code::{Code, DistSpec, Op, Operand};
+pub(crate) use crate::lang::density::Score;
+use crate::lang::density::{self, likelihood_score};
 use crate::lang::error::{Fault, FaultKind};
 use crate::lang::value::{Closure, Value};
-use smallvec::SmallVec;
+use pcadlang_numerics::num::ExactSum;
 
 impl Graph {
     /// Makes one attempt to run the operation of a node.
-    pub(super) fn run_op(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let frame = self.nodes[n as usize].frame;
-        match self.op(code, n) {
-            Op::Param { index, default } => self.evaluate_param(code, n, *index, *default),
-            Op::Item => self.evaluate_item(code, n),
-            Op::Accumulator => self.evaluate_accumulator(code, n),
+    pub(super) fn run_op(&mut self, code: &Code, n: NodeId) -> Step {
+        let frame = self.store[n].frame;
+        match &code.ops[self.store[n].op] {
+            Op::Param { index, default } => self.evaluate_param(n, *index, *default),
+            Op::Item => self.evaluate_item(n),
+            Op::Accumulator => self.evaluate_accumulator(n),
             Op::Prim { builtin, args } => {
                 let builtin = code.builtins.get(*builtin);
                 let mut deps = Deps::new();
                 let made = match self
-                    .inputs(code, frame, args, &mut deps)
+                    .inputs(frame, args, &mut deps)
                     .map(|values| self.apply_at(n, builtin, &values))
                 {
                     Ok(made) => made,
-                    Err(m) => return self.need(code, m),
+                    Err(m) => return self.need(m),
                 };
-                let made = made.map_err(|e| self.fault(code, n, e))?;
-                self.finish_call(code, n, deps, made)
+                let made = made.map_err(|e| self.fault(n, e))?;
+                self.finish_call(n, deps, made)
             }
             Op::Array(items) => {
-                if let Some(step) = self.await_plain(code, n, frame, items)? {
+                if let Some(step) = self.await_plain(frame, items)? {
                     return Ok(step);
                 }
                 let mut deps = Deps::new();
                 let values =
-                    items.iter().map(|o| self.plain(code, frame, *o, &mut deps).clone()).collect();
+                    items.iter().map(|o| self.plain(frame, *o, &mut deps).clone()).collect();
                 self.set_deps(n, deps);
-                self.finish_made(code, n, Value::from_elements(values))
+                self.finish_made(n, Value::from_elements(values))
             }
             Op::Record { names, values } => {
-                if let Some(step) = self.await_plain(code, n, frame, values)? {
+                if let Some(step) = self.await_plain(frame, values)? {
                     return Ok(step);
                 }
                 let mut deps = Deps::new();
                 let fields = names.iter().zip(values.iter());
                 let fields = fields
-                    .map(|(k, o)| (k.clone(), self.plain(code, frame, *o, &mut deps).clone()))
+                    .map(|(k, o)| (k.clone(), self.plain(frame, *o, &mut deps).clone()))
                     .collect();
                 self.set_deps(n, deps);
-                self.finish_made(code, n, Value::Record(std::sync::Arc::new(fields)))
+                self.finish_made(n, Value::Record(std::sync::Arc::new(fields)))
             }
             Op::Closure(block) => {
-                Ok(self.finish(code, n, Value::Closure(Closure { block: *block, frame })))
+                Ok(self.finish(n, Value::Closure(Closure { block: *block, frame })))
             }
             Op::Index { base, keys } => self.evaluate_index(code, n, *base, keys),
-            Op::Call { callee, args, site } => self.evaluate_call(code, n, *callee, args, *site),
-            Op::If { cond, then, otherwise } => self.evaluate_if(code, n, *cond, *then, *otherwise),
+            Op::Call { callee, args, site } => self.evaluate_call(n, *callee, args, *site),
+            Op::If { cond, then, otherwise } => self.evaluate_if(n, *cond, *then, *otherwise),
             Op::Select { cond, then, otherwise } => {
-                self.evaluate_select(code, n, *cond, *then, *otherwise)
+                self.evaluate_select(n, *cond, *then, *otherwise)
             }
-            Op::For { iter, body } => self.evaluate_for(code, n, *iter, *body),
-            Op::Map { f, over, site } => self.evaluate_map(code, n, *f, *over, *site),
-            Op::Fold { f, init, over, site } => {
-                self.evaluate_fold(code, n, *f, *init, *over, *site)
-            }
+            Op::For { iter, body } => self.evaluate_for(n, *iter, *body),
+            Op::Map { f, over, .. } => self.evaluate_map(n, *f, *over),
+            Op::Fold { f, init, over, .. } => self.evaluate_fold(n, *f, *init, *over),
             Op::Container { sources, .. } => self.evaluate_container(code, n, sources),
             Op::Gather => self.evaluate_gather(code, n),
-            Op::Mem { f, .. } => self.evaluate_mem(code, n, *f),
-            Op::Draw { dist, site, keys } => self.evaluate_draw(code, n, dist, *site, keys),
-            Op::Observe { dist, value, .. } => self.evaluate_observe(code, n, dist, *value),
-            Op::Factor { weight, .. } => self.evaluate_factor(code, n, *weight),
+            Op::Mem { f, .. } => self.evaluate_mem(n, *f),
+            Op::Draw { dist, site, keys } => self.evaluate_draw(n, dist, *site, keys),
+            Op::Observe { dist, value, .. } => self.evaluate_observe(n, dist, *value),
+            Op::Factor { weight, .. } => self.evaluate_factor(n, *weight),
             Op::Probe(p) => {
-                let value = self.probe(*p);
-                Ok(self.finish(code, n, Value::Num(value)))
+                let value = self.score.probe(*p);
+                Ok(self.finish(n, Value::Num(value)))
             }
         }
-    }
-
-    /// Returns the node to wait for before an operand can be read.
-    pub(super) fn unready(&self, frame: FrameId, o: Operand) -> Option<NodeId> {
-        self.resolve(frame, o).filter(|n| self.nodes[*n as usize].state != State::Clean)
     }
 
     /// Waits for operands; `None` if all are ready.
     pub(super) fn await_all(
         &mut self,
-        code: &Code,
         frame: FrameId,
         operands: &[Operand],
     ) -> Result<Option<Poll>, Failure> {
         for o in operands {
             if let Some(m) = self.unready(frame, *o) {
-                return self.need(code, m).map(Some);
+                return self.need(m).map(Some);
             }
         }
         Ok(None)
@@ -110,77 +103,21 @@ impl Graph {
     /// Waits for operands, and for the elements of those that are containers.
     pub(super) fn await_plain(
         &mut self,
-        code: &Code,
-        _n: NodeId,
         frame: FrameId,
         operands: &[Operand],
     ) -> Result<Option<Poll>, Failure> {
         for o in operands {
             if let Some(m) = self.unready(frame, *o) {
-                return self.need(code, m).map(Some);
+                return self.need(m).map(Some);
             }
-            if let Value::Container(r) = self.value(code, frame, *o)
-                && self.nodes[r.node as usize + 1].state != State::Clean
+            if let Value::Container(r) = self.value(frame, *o)
+                && self.store[r.node.gather()].state != State::Clean
             {
-                let gather = r.node + 1;
-                return self.need(code, gather).map(Some);
+                let gather = r.node.gather();
+                return self.need(gather).map(Some);
             }
         }
         Ok(None)
-    }
-
-    /// Returns the values of operands, with containers read as arrays or records, or else
-    /// the node to wait for.
-    pub(crate) fn inputs<'a>(
-        &'a self,
-        code: &'a Code,
-        frame: FrameId,
-        operands: &[Operand],
-        deps: &mut Deps,
-    ) -> Result<SmallVec<[&'a Value; 4]>, NodeId> {
-        let mut values = SmallVec::new();
-        for o in operands {
-            let value = match self.resolve(frame, *o) {
-                None => self.value(code, frame, *o),
-                Some(m) => {
-                    let node = &self.nodes[m as usize];
-                    if node.state != State::Clean {
-                        return Err(m);
-                    }
-                    &node.value
-                }
-            };
-            values.push(match value {
-                Value::Container(r) => {
-                    let gather = &self.nodes[r.node as usize + 1];
-                    if gather.state != State::Clean {
-                        return Err(r.node + 1);
-                    }
-                    deps.push(r.node + 1);
-                    &gather.value
-                }
-                v => v,
-            });
-        }
-        Ok(values)
-    }
-
-    /// Returns the value of an operand, with a container read as an array or record;
-    /// nodes read for that are added to `deps`.
-    pub(super) fn plain<'a>(
-        &'a self,
-        code: &'a Code,
-        frame: FrameId,
-        o: Operand,
-        deps: &mut Deps,
-    ) -> &'a Value {
-        match self.value(code, frame, o) {
-            Value::Container(r) => {
-                deps.push(r.node + 1);
-                &self.nodes[r.node as usize + 1].value
-            }
-            v => v,
-        }
     }
 
     /// Calls a built-in at a node; an incremental function continues from its previous
@@ -198,34 +135,136 @@ impl Graph {
     }
 
     /// Ends the evaluation of a call.
-    fn finish_call(
-        &mut self,
-        code: &Code,
-        n: NodeId,
-        deps: Deps,
-        made: Made,
-    ) -> Result<Poll, Failure> {
+    fn finish_call(&mut self, n: NodeId, deps: Deps, made: Made) -> Step {
         match made {
             Made::Value(value) => {
                 self.set_deps(n, deps);
-                self.finish_made(code, n, value)
+                self.finish_made(n, value)
             }
             Made::Kept(before) => {
                 let value = before.value.clone();
                 self.keep(n, deps, before);
-                self.finish_made(code, n, value)
+                self.finish_made(n, value)
             }
         }
     }
 
-    /// Turns a fault of a built-in into an error at a node.
-    pub(super) fn fault(&self, code: &Code, n: NodeId, f: Fault) -> Failure {
-        self.fail(code, n, f.kind, f.message, f.hint)
+    pub(super) fn evaluate_observe(&mut self, n: NodeId, spec: &DistSpec, value: Operand) -> Step {
+        let mut deps = Deps::new();
+        // Observing a view renders a picture.
+        if matches!(spec, DistSpec::Value(_)) {
+            self.budget.count_large();
+        }
+        let score = match self.observation_score(n, spec, value, &mut deps) {
+            Ok(score) => score?,
+            Err(m) => return self.need(m),
+        };
+        let stale = self.store[n].flags & WAS_STALE != 0;
+        if stale {
+            self.retire_score(n);
+        }
+        match score {
+            Score::One(score) => {
+                self.score.likelihood.add(score);
+                self.store[n].score = score;
+                if matches!(self.store[n].side.as_deref(), Some(Side::Total(_))) || !deps.is_empty()
+                {
+                    self.set_total(n, ExactSum::default());
+                }
+            }
+            Score::Sum(sum) => {
+                self.score.likelihood.merge(&sum);
+                self.store[n].score = 0.0;
+                self.set_total(n, sum);
+            }
+        }
+        self.set_deps(n, deps);
+        self.store[n].flags &= !TARGET;
+        Ok(self.finish(n, Value::Unit))
     }
 
-    /// Builds a type error at a node.
-    pub(super) fn type_error(&self, code: &Code, n: NodeId, message: String) -> Failure {
-        self.fail(code, n, FaultKind::Type, message, None)
+    /// Stores the total of an observation's elements.
+    fn set_total(&mut self, n: NodeId, sum: ExactSum) {
+        match self.store[n].side.as_deref_mut() {
+            Some(Side::Total(t)) => {
+                let old = std::mem::replace(&mut t.sum, sum);
+                self.update.note(Entry::Sum(n, old));
+            }
+            _ => self.set_side(n, Some(Side::Total(Total { sum, deps: Deps::new() }))),
+        }
+    }
+
+    /// Returns the log density of an observation's coarse surrogate, which is never part
+    /// of the joint.
+    pub(crate) fn surrogate_score(
+        &mut self,
+        code: &Code,
+        n: NodeId,
+    ) -> Result<Option<f64>, Failure> {
+        let frame = self.store[n].frame;
+        let Op::Observe { value, coarse: Some(coarse), .. } = self.op(n) else {
+            return Ok(None);
+        };
+        let (value, coarse) = (*value, *coarse);
+        for o in [value, coarse] {
+            if let Some(m) = self.unready(frame, o) {
+                self.evaluate(code, m)?;
+            }
+        }
+        let observed = match self.replaced(n) {
+            Some(v) => v,
+            None => self.value(frame, value),
+        };
+        let score = match self.value(frame, coarse) {
+            v @ Value::Likelihood(_) => likelihood_score(v, observed),
+            Value::Dist(d) => density::score(d, observed).map(|s| match s {
+                Score::One(x) => x,
+                Score::Sum(s) => s.value(),
+            }),
+            v => Err(Fault::type_error(format!(
+                "`with coarse` needs a distribution or likelihood, got {}",
+                v.type_name()
+            ))),
+        };
+        score.map(Some).map_err(|f| self.fault(n, f))
+    }
+
+    pub(super) fn evaluate_factor(&mut self, n: NodeId, weight: Operand) -> Step {
+        let frame = self.store[n].frame;
+        if let Some(m) = self.unready(frame, weight) {
+            return self.need(m);
+        }
+        let score = match self.value(frame, weight) {
+            Value::Num(w) if w.is_nan() => {
+                let hint =
+                    "0 / 0, inf - inf and the logarithm of a negative number are NaN".to_owned();
+                return Err(self.fail(
+                    n,
+                    FaultKind::Domain,
+                    "the log weight is not a number".into(),
+                    Some(hint),
+                ));
+            }
+            Value::Num(w) => *w,
+            v => {
+                let message =
+                    format!("`factor` needs a log weight, a number; got {}", v.type_name());
+                return Err(self.type_error(n, message));
+            }
+        };
+        if self.store[n].flags & WAS_STALE != 0 {
+            self.retire_score(n);
+        }
+        self.score.likelihood.add(score);
+        self.store[n].score = score;
+        Ok(self.finish(n, Value::Unit))
+    }
+
+    /// Removes an observation's or factor's score from the likelihood.
+    pub(crate) fn retire_score(&mut self, n: NodeId) {
+        let mut likelihood = std::mem::take(&mut self.score.likelihood);
+        self.take_score(n, &mut likelihood);
+        self.score.likelihood = likelihood;
     }
 }
 

@@ -19,11 +19,10 @@ impl Reverse<'_> {
         args: &[Operand],
         by: &Adjoint,
     ) -> Result<(), Failure> {
-        let values = self.values(self.graph.nodes[n as usize].frame, args);
+        let values = self.values(self.graph[n].frame, args);
         let a = Args { builtin, values: &values };
         let operand = |i: usize| args.get(i).copied();
-        let argument_adjoints =
-            self.by_call(n, &a, &self.graph.nodes[n as usize].value, by, operand)?;
+        let argument_adjoints = self.by_call(n, &a, &self.graph[n].value, by, operand)?;
         self.give_arguments(n, builtin, args.iter().map(|o| Some(*o)), argument_adjoints)
     }
 
@@ -31,12 +30,12 @@ impl Reverse<'_> {
     /// node is not such a call.
     pub(super) fn vjp_called(&mut self, n: NodeId, by: &Adjoint) -> Result<bool, Failure> {
         let g = self.graph;
-        let frame = g.nodes[n as usize].frame;
-        let Op::Call { callee: Callee::Value(f), args, .. } = g.op(self.code, n) else {
+        let frame = g[n].frame;
+        let Op::Call { callee: Callee::Value(f), args, .. } = g.op(n) else {
             return Ok(false);
         };
-        let Value::Builtin(i) = g.value(self.code, frame, *f) else { return Ok(false) };
-        let builtin = self.code.builtins.get(*i);
+        let Value::Builtin(i) = g.value(frame, *f) else { return Ok(false) };
+        let builtin = self.graph.code.builtins.get(*i);
         // The names were matched before, when it was called.
         let Ok(order) = builtin.match_names(args.iter().map(|(k, _)| k.as_deref())) else {
             return Ok(false);
@@ -44,18 +43,11 @@ impl Reverse<'_> {
         let operands: SmallVec<[Option<Operand>; 8]> =
             order.iter().map(|i| i.and_then(|i| args.get(i)).map(|a| a.1)).collect();
         let mut deps = Deps::new();
-        let value = |o: &Option<Operand>| {
-            o.map_or(&Value::Unit, |o| g.plain(self.code, frame, o, &mut deps))
-        };
+        let value = |o: &Option<Operand>| o.map_or(&Value::Unit, |o| g.plain(frame, o, &mut deps));
         let values: SmallVec<[&Value; 8]> = operands.iter().map(value).collect();
         let operand = |i: usize| operands.get(i).copied().flatten();
-        let argument_adjoints = self.by_call(
-            n,
-            &Args { builtin, values: &values },
-            &g.nodes[n as usize].value,
-            by,
-            operand,
-        )?;
+        let argument_adjoints =
+            self.by_call(n, &Args { builtin, values: &values }, &g[n].value, by, operand)?;
         self.give_arguments(n, builtin, operands, argument_adjoints)?;
         Ok(true)
     }
@@ -63,14 +55,13 @@ impl Reverse<'_> {
     /// Propagates an adjoint through a built-in applied to each element.
     pub(super) fn vjp_mapped(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
         let g = self.graph;
-        let frame = g.nodes[n as usize].frame;
-        let Op::Map { f, over, .. } = g.op(self.code, n) else { return Ok(()) };
-        let Value::Builtin(i) = g.value(self.code, frame, *f) else {
+        let frame = g[n].frame;
+        let Op::Map { f, over, .. } = g.op(n) else { return Ok(()) };
+        let Value::Builtin(i) = g.value(frame, *f) else {
             return Err(self.no_derivative(n, "the result of this map"));
         };
-        let builtin = self.code.builtins.get(*i);
-        let (xs, ys) =
-            (g.plain(self.code, frame, *over, &mut Deps::new()), &g.nodes[n as usize].value);
+        let builtin = self.graph.code.builtins.get(*i);
+        let (xs, ys) = (g.plain(frame, *over, &mut Deps::new()), &g[n].value);
         let mut whole = Adjoint::Zero;
         for i in 0..xs.len().unwrap_or(0) {
             let (x, y, by) = match (xs, ys) {
@@ -107,7 +98,7 @@ impl Reverse<'_> {
         let unknown = || self.no_derivative(n, &format!("`{}`", a.builtin.full_name()));
         match (a.builtin.kind, a.builtin.derivative, value) {
             (Kind::Distribution(_), _, Value::Dist(d)) => {
-                let frame = self.graph.nodes[n as usize].frame;
+                let frame = self.graph[n].frame;
                 let source = |i: usize| operand(i).and_then(|o| self.source(frame, o));
                 self.by_distribution(n, a, d, by, |i| source(i).is_some_and(|s| self.is_active(s)))
             }
@@ -123,7 +114,7 @@ impl Reverse<'_> {
         args: impl IntoIterator<Item = Option<Operand>>,
         argument_adjoints: impl IntoIterator<Item = Adjoint>,
     ) -> Result<(), Failure> {
-        let frame = self.graph.nodes[n as usize].frame;
+        let frame = self.graph[n].frame;
         for (i, (o, part)) in args.into_iter().zip(argument_adjoints).enumerate() {
             let Some(source) = o.and_then(|o| self.source(frame, o)) else { continue };
             if !self.is_active(source) {

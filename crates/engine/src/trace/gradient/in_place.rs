@@ -9,6 +9,7 @@ use crate::lang::value::Value;
 use crate::trace::Trace;
 use crate::trace::graph::Graph;
 use crate::trace::node::*;
+use crate::trace::store::Store;
 use pcadlang_numerics::num::ExactSum;
 use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
@@ -23,7 +24,7 @@ pub(in crate::trace) type Given = SmallVec<[(u32, u32); 2]>;
 #[derive(Debug, Default)]
 pub(in crate::trace) struct InPlace {
     values: Vec<(Given, NodeId, Form)>,
-    /// What else of a node moves.
+    /// The other parts of nodes that move.
     besides: Vec<(Given, NodeId, Besides)>,
     /// Nodes that contribute to the score, and where their terms are on the tape.
     scores: Vec<(Given, NodeId, Scored)>,
@@ -60,14 +61,14 @@ impl OneNumber {
         }
     }
 
-    /// Whether the choice has this value.
+    /// True if the choice has this value.
     #[inline]
     fn applies(&self, values: &[usize]) -> bool {
         self.choice == NONE || values.get(self.choice as usize) == Some(&(self.value as usize))
     }
 }
 
-/// What a node keeps besides its value, and where that is on a tape.
+/// A thing that a node keeps besides its value, and its place on a tape.
 #[derive(Clone, Debug)]
 pub(in crate::trace) enum Besides {
     /// The last evaluation of an incremental function.
@@ -81,15 +82,15 @@ impl InPlace {
     /// node keeps anything else that moves.
     pub fn add_value(
         &mut self,
-        (graph, code): (&Graph, &Code),
+        graph: &Store,
         n: NodeId,
         given: Given,
         form: Form,
         besides: Option<&Besides>,
         is_fixed: impl Fn(FrameId, Operand) -> bool,
     ) -> bool {
-        let node = &graph.nodes[n as usize];
-        let op = graph.op(code, n);
+        let node = &graph[n];
+        let op = graph.op(n);
         let fits = match node.side.as_deref() {
             None | Some(Side::Deps(_) | Side::Child(_) | Side::MemoCall(_)) => true,
             // Noise that is not given stays.
@@ -141,9 +142,9 @@ impl InPlace {
         self
     }
 
-    /// Whether [`InPlace::apply`] can move the trace to the point of the tape's last run,
+    /// True if [`InPlace::apply`] can move the trace to the point of the tape's last run,
     /// with choices that are summed out at these values.
-    pub fn fits(&mut self, graph: &Graph, code: &Code, tape: &Tape, values: &[usize]) -> bool {
+    pub fn fits(&mut self, graph: &Graph, tape: &Tape, values: &[usize]) -> bool {
         self.made.clear();
         self.columns.clear();
         for (given, n, form) in &self.values {
@@ -153,17 +154,17 @@ impl InPlace {
             }
         }
         let one = |s: &OneNumber| {
-            let node = &graph.nodes[s.node as usize];
+            let node = &graph.store[s.node];
             !s.applies(values)
                 || node.state != State::Clean
-                || takes_one(graph.op(code, s.node), node.side.as_deref())
+                || takes_one(graph.op(s.node), node.side.as_deref())
         };
         self.number_scores.iter().all(one)
             && self.scores.iter().filter(|(given, n, _)| holds(graph, given, *n, values)).all(
                 |(_, n, scored)| {
                     let terms = tape.terms(scored, &mut self.each, &mut self.columns);
-                    let node = &graph.nodes[*n as usize];
-                    match (graph.op(code, *n), node.side.as_deref(), terms) {
+                    let node = &graph.store[*n];
+                    match (graph.op(*n), node.side.as_deref(), terms) {
                         (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
                             c.scores.len() == self.each.len() && c.elements != NONE
                         }
@@ -186,7 +187,7 @@ impl InPlace {
         before: Option<&ScoreSums>,
     ) {
         for v in &self.number_values {
-            let node = &mut graph.nodes[v.node as usize];
+            let node = &mut graph.store[v.node];
             if v.applies(values) && node.state == State::Clean {
                 let now = tape.number(v.at as usize);
                 match &mut node.value {
@@ -200,7 +201,7 @@ impl InPlace {
             if !holds(graph, given, *n, values) {
                 continue;
             }
-            let value = &mut graph.nodes[*n as usize].value;
+            let value = &mut graph.store[*n].value;
             match (tape.numbers(form), form) {
                 (Some([x]), Form::Num(_)) => *value = Value::Num(*x),
                 (Some(xs), _) => put(value, xs),
@@ -211,7 +212,7 @@ impl InPlace {
             if !holds(graph, given, *n, values) {
                 continue;
             }
-            match (graph.nodes[*n as usize].side.as_deref_mut(), besides) {
+            match (graph.store[*n].side.as_deref_mut(), besides) {
                 (Some(Side::Kept(kept)), Besides::Evaluation(call)) => {
                     if let Some(evaluation) = tape.evaluation(call) {
                         kept.before = Arc::clone(evaluation);
@@ -229,10 +230,10 @@ impl InPlace {
                 continue;
             }
             if before.is_none() {
-                graph.put_scored(code, *n, &mut old.prior, &mut old.likelihood);
+                graph.put_scored(*n, &mut old.prior, &mut old.likelihood);
             }
             let terms = tape.terms(scored, &mut self.each, &mut self.columns);
-            let node = &mut graph.nodes[*n as usize];
+            let node = &mut graph.store[*n];
             match (node.side.as_deref_mut(), terms) {
                 (Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
                     c.scores.copy_from_slice(&self.each)
@@ -254,7 +255,7 @@ impl InPlace {
                 _ => {}
             }
             if before.is_none() {
-                graph.put_scored(code, *n, &mut new.prior, &mut new.likelihood);
+                graph.put_scored(*n, &mut new.prior, &mut new.likelihood);
             }
         }
         drop(made);
@@ -263,7 +264,7 @@ impl InPlace {
             Some(before) => (tape.sums(), before),
             None => (&new, &old),
         };
-        new.replace(old, &mut graph.prior, &mut graph.likelihood);
+        new.replace(old, &mut graph.score.prior, &mut graph.score.likelihood);
         graph.revision += 1;
     }
 
@@ -277,12 +278,12 @@ impl InPlace {
     ) {
         self.old.iter_mut().chain(&mut self.new).for_each(Vec::clear);
         for s in &self.number_scores {
-            let node = &mut graph.nodes[s.node as usize];
+            let node = &mut graph.store[s.node];
             if !s.applies(values) || node.state != State::Clean {
                 continue;
             }
             let score = tape.number(s.at as usize);
-            let likelihood = usize::from(!matches!(code.ops[node.op as usize], Op::Draw { .. }));
+            let likelihood = usize::from(!matches!(code.ops[node.op], Op::Draw { .. }));
             match node.side.as_deref_mut() {
                 Some(Side::Total(t)) => {
                     if node.score == 0.0 {
@@ -304,7 +305,7 @@ impl InPlace {
     }
 }
 
-/// Whether a node with this operation and side can take a score that is one term.
+/// True if a node with this operation and side can take a score that is one term.
 fn takes_one(op: &Op, side: Option<&Side>) -> bool {
     match (op, side) {
         (Op::Draw { .. }, Some(Side::Choice(c))) => c.elements == NONE,
@@ -314,10 +315,10 @@ fn takes_one(op: &Op, side: Option<&Side>) -> bool {
     }
 }
 
-/// Whether a node exists, and depends on choices that are summed out through these values.
+/// True if a node exists, and depends on choices that are summed out through these values.
 fn holds(graph: &Graph, given: &Given, n: NodeId, values: &[usize]) -> bool {
     let same = |(x, value): &(u32, u32)| values.get(*x as usize) == Some(&(*value as usize));
-    given.iter().all(same) && graph.nodes[n as usize].state == State::Clean
+    given.iter().all(same) && graph.store[n].state == State::Clean
 }
 
 /// Replaces an array, in its own memory if nothing else holds it.
@@ -333,15 +334,15 @@ fn put(value: &mut Value, xs: &[f64]) {
 }
 
 impl Trace {
-    /// Whether every node of a trace of the same history is the same to the last bit; else
+    /// True if every node of a trace of the same history is the same to the last bit; else
     /// says how one differs.
     pub fn same_nodes(&self, other: &Trace) -> Result<(), String> {
         let (mine, theirs) = (&self.graph, &other.graph);
-        let all = |g: &Graph| (g.nodes.len(), g.prior.clone(), g.likelihood.clone());
+        let all = |g: &Graph| (g.store.len(), g.score.prior.clone(), g.score.likelihood.clone());
         if all(mine) != all(theirs) {
             return Err(format!("sums {:?}, {:?}", all(mine), all(theirs)));
         }
-        for (i, (a, b)) in mine.nodes.iter().zip(&theirs.nodes).enumerate() {
+        for ((i, a), (_, b)) in mine.nodes().zip(theirs.nodes()) {
             // Distributions and objects are the same only if they are one.
             let same_value = match (a.value.downcast(), b.value.downcast()) {
                 (Some(CovarianceValue(a)), Some(CovarianceValue(b))) => a == b,
@@ -350,7 +351,7 @@ impl Trace {
             let rest =
                 |n: &Node| (n.score.to_bits(), n.state, n.refs, n.flags, format!("{:?}", n.side));
             if !same_value || rest(a) != rest(b) {
-                return Err(format!("node {i}: {a:?}, {b:?}"));
+                return Err(format!("node {i:?}: {a:?}, {b:?}"));
             }
         }
         Ok(())

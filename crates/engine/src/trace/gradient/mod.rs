@@ -20,11 +20,11 @@ pub use recording::Recording;
 pub(in crate::trace) use recording::SummedChoices;
 
 use super::choices::Target;
-use super::graph::Graph;
 use super::node::*;
+use super::store::Store;
 use super::update::Failure;
 use crate::lang::adjoint::Adjoint;
-use crate::lang::code::{Code, DistSpec, Operand};
+use crate::lang::code::{DistSpec, Operand};
 use crate::lang::error::FaultKind;
 use crate::lang::value::Value;
 use pcadlang_numerics::dist::{Datum, Dist};
@@ -34,7 +34,7 @@ use smallvec::SmallVec;
 /// Nodes that a value is computed from.
 type Inputs = SmallVec<[NodeId; 8]>;
 
-/// Whether a node's value depends on a target of the gradient.
+/// True if a node's value depends on a target of the gradient.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Mark {
     Unseen,
@@ -46,8 +46,7 @@ enum Mark {
 
 /// A reverse pass.
 pub(super) struct Reverse<'a> {
-    graph: &'a Graph,
-    code: &'a Code,
+    graph: &'a Store,
     marks: Vec<Mark>,
     /// The active nodes, operands first.
     order: Vec<NodeId>,
@@ -58,7 +57,7 @@ pub(super) struct Reverse<'a> {
     power: f64,
 }
 
-impl Graph {
+impl Store {
     /// Appends to `out` the gradient, with respect to the unconstrained coordinates of
     /// the targets one after the other, of the log prior plus `power` times the log
     /// likelihood plus the log Jacobians of the transforms, with a weight for each score.
@@ -69,19 +68,17 @@ impl Graph {
     /// error names the operation.
     pub fn gradient(
         &self,
-        code: &Code,
         targets: &[Target],
         scored: &[NodeId],
         (power, weight): (f64, &dyn Fn(NodeId) -> f64),
         out: &mut Vec<f64>,
     ) -> Result<(), Failure> {
-        let mut marks = vec![Mark::Unseen; self.nodes.len()];
+        let mut marks = vec![Mark::Unseen; self.len()];
         for t in targets {
-            marks[t.node as usize] = Mark::Target;
+            marks[t.node] = Mark::Target;
         }
         let mut pass = Reverse {
             graph: self,
-            code,
             marks,
             order: Vec::new(),
             adjoints: FxHashMap::default(),
@@ -93,7 +90,7 @@ impl Graph {
         }
         let mut active_scores = Vec::new();
         for n in scored {
-            let mut reached = pass.marks[*n as usize] == Mark::Active;
+            let mut reached = pass.marks[*n] == Mark::Active;
             for input in pass.score_inputs(*n) {
                 reached |= pass.visit(input);
             }
@@ -112,16 +109,14 @@ impl Graph {
             let by = pass.adjoints.remove(&n).unwrap_or_default();
             // A likelihood may have no derivative for some of its arguments; that matters
             // only if these depend on a target.
-            let in_parts = matches!(
-                (&self.nodes[n as usize].value, &by),
-                (Value::Likelihood(_), Adjoint::List(_))
-            );
+            let in_parts =
+                matches!((&self[n].value, &by), (Value::Likelihood(_), Adjoint::List(_)));
             if by.is_unknown() && !in_parts {
                 return Err(pass.no_derivative(n, "a value computed from this"));
             }
             if let Some(place) = own.get_mut(&n) {
                 pass.vjp_support(n, targets, &by)?;
-                *place = self.own(code, n, by);
+                *place = self.own(n, by);
             } else if !by.is_zero() {
                 pass.vjp(n, &by)?;
             }
@@ -134,8 +129,8 @@ impl Graph {
         Ok(())
     }
 
-    fn own(&self, code: &Code, n: NodeId, mut by: Adjoint) -> Option<TargetAdjoint> {
-        let (dist, stored) = (self.dist_of(code, n)?, self.stored(n)?);
+    fn own(&self, n: NodeId, mut by: Adjoint) -> Option<TargetAdjoint> {
+        let (dist, stored) = (self.dist_of(n)?, self.stored(n)?);
         if dist.is_stored_whitened() {
             // The value moves with the noise, which has its own density.
             let mut g = dist.from_noncentred_vjp(&by.numbers(stored.len()?))?;
@@ -191,7 +186,7 @@ fn flatten(by: &Adjoint, n: usize, out: &mut Vec<f64>) {
 }
 
 impl<'a> Reverse<'a> {
-    /// Whether a node's value depends on a target; if so, it is appended to the order.
+    /// True if a node's value depends on a target; if so, it is appended to the order.
     fn visit(&mut self, root: NodeId) -> bool {
         // A node, its inputs, how many of them are done, and whether it is active so far.
         let mut stack: Vec<(NodeId, Inputs, usize, bool)> = Vec::new();
@@ -200,13 +195,13 @@ impl<'a> Reverse<'a> {
             let Some(input) = inputs.get(*next).copied() else {
                 let (n, active) = (*n, *active);
                 stack.pop();
-                self.marks[n as usize] = if active { Mark::Active } else { Mark::Fixed };
+                self.marks[n] = if active { Mark::Active } else { Mark::Fixed };
                 if active {
                     self.order.push(n);
                 }
                 continue;
             };
-            match self.marks[input as usize] {
+            match self.marks[input] {
                 Mark::Unseen | Mark::Target => self.open(input, &mut stack),
                 mark => {
                     *active |= mark == Mark::Active;
@@ -214,20 +209,20 @@ impl<'a> Reverse<'a> {
                 }
             }
         }
-        self.marks[root as usize] == Mark::Active
+        self.marks[root] == Mark::Active
     }
 
     fn open(&mut self, n: NodeId, stack: &mut Vec<(NodeId, Inputs, usize, bool)>) {
-        let target = match self.marks[n as usize] {
+        let target = match self.marks[n] {
             Mark::Unseen => false,
             Mark::Target => true,
             _ => return,
         };
         let inputs = self.inputs(n, target);
         if inputs.is_empty() && !target {
-            self.marks[n as usize] = Mark::Fixed;
+            self.marks[n] = Mark::Fixed;
         } else {
-            self.marks[n as usize] = Mark::Open;
+            self.marks[n] = Mark::Open;
             stack.push((n, inputs, 0, target));
         }
     }
@@ -235,20 +230,20 @@ impl<'a> Reverse<'a> {
     /// Returns the node that holds an operand's value; a container is read as a whole.
     fn source(&self, frame: FrameId, o: Operand) -> Option<NodeId> {
         let n = self.graph.resolve(frame, o)?;
-        Some(match &self.graph.nodes[n as usize].value {
-            Value::Container(r) => r.node + 1,
+        Some(match &self.graph[n].value {
+            Value::Container(r) => r.node.gather(),
             _ => n,
         })
     }
 
     /// Returns the values of a call's arguments.
     fn values(&self, frame: FrameId, args: &[Operand]) -> SmallVec<[&'a Value; 8]> {
-        let (graph, code) = (self.graph, self.code);
-        args.iter().map(|a| graph.plain(code, frame, *a, &mut Deps::new())).collect()
+        let graph = self.graph;
+        args.iter().map(|a| graph.plain(frame, *a, &mut Deps::new())).collect()
     }
 
     fn is_active(&self, n: NodeId) -> bool {
-        self.marks[n as usize] == Mark::Active
+        self.marks[n] == Mark::Active
     }
 
     /// Adds to the adjoint of an operand.
@@ -265,13 +260,12 @@ impl<'a> Reverse<'a> {
     }
 
     fn dist_inputs(&self, n: NodeId, dist: &DistSpec, inputs: &mut Inputs) {
-        let frame = self.graph.nodes[n as usize].frame;
+        let frame = self.graph[n].frame;
         inputs.extend(dist.operands().iter().filter_map(|o| self.source(frame, *o)));
     }
 
     fn no_derivative(&self, n: NodeId, of: &str) -> Failure {
         self.graph.fail(
-            self.code,
             n,
             FaultKind::Type,
             format!("{of} depends on a selected choice, but its derivative is not available"),

@@ -8,47 +8,45 @@
 
 use super::in_place::{Besides, Given, InPlace};
 use super::{Inputs, Reverse};
-use crate::lang::code::{Callee, Code, DistSpec, Op, Operand};
+use crate::lang::code::{Callee, DistSpec, Op, Operand};
 use crate::lang::tape::{Builder, Form, Scored, Tape};
 use crate::lang::value::Value;
+use crate::trace::Trace;
 use crate::trace::choices::Target;
-use crate::trace::graph::Graph;
 use crate::trace::journal::Entry;
 use crate::trace::node::*;
 use pcadlang_numerics::dist::Dist;
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::sync::Arc;
 
-impl Graph {
+impl Trace {
     /// Returns the nodes that an update of these choices may run.
-    fn reached(&mut self, code: &Code, targets: &[Target]) -> Vec<NodeId> {
-        let before = self.begin();
+    fn reached(&mut self, targets: &[Target]) -> Vec<NodeId> {
+        let g = &mut self.graph;
+        let before = g.begin();
         for (i, t) in targets.iter().enumerate() {
             // Elements of one choice are adjacent.
             if i == 0 || targets[i - 1].node != t.node {
-                self.invalidate_target(code, t.node);
+                g.update.invalidate_target(&mut g.store, &self.code, t.node);
             }
         }
-        let mut all: Vec<NodeId> = self
-            .journal
+        let mut all: Vec<NodeId> = g
+            .update
+            .journal()
             .iter()
             .filter_map(|e| if let Entry::Node { id, .. } = e { Some(*id) } else { None })
             .collect();
-        self.rollback(code, before);
-        self.sort_by_place(&mut all);
+        g.rollback(before);
+        g.sort_by_place(&mut all);
         all
     }
 
     /// Records the log density as a function of the unconstrained coordinates of the
     /// targets, one after the other; `None` if it is not a straight-line program. With it
     /// comes how the trace can be moved in place, if it can.
-    pub(super) fn record(
-        &mut self,
-        code: &Code,
-        targets: &[Target],
-    ) -> Option<(Tape, Option<InPlace>)> {
-        let reached = self.reached(code, targets);
-        let mut r = self.recorder(code, &reached, Recorded::new(self.incremental), true);
+    pub(super) fn record_tape(&mut self, targets: &[Target]) -> Option<(Tape, Option<InPlace>)> {
+        let reached = self.reached(targets);
+        let mut r = self.recorder(&reached, Recorded::new(self.graph.incremental), true);
         for t in targets {
             r.place(*t)?;
         }
@@ -67,14 +65,13 @@ impl Graph {
     /// that are summed out a node has its value; `None` if it exists for some only.
     pub(in crate::trace) fn record_scores(
         &mut self,
-        code: &Code,
         targets: &[Target],
         recorded: Recorded,
         given: &FxHashMap<NodeId, Option<Given>>,
         work: impl FnOnce(&mut Recorder) -> Option<()>,
     ) -> Option<Recorded> {
-        let reached = self.reached(code, targets);
-        let mut r = self.recorder(code, &reached, recorded, false);
+        let reached = self.reached(targets);
+        let mut r = self.recorder(&reached, recorded, false);
         if r.recorded.placed.is_empty() {
             for t in targets {
                 r.place(*t)?;
@@ -96,14 +93,12 @@ impl Graph {
 
     fn recorder<'a>(
         &'a self,
-        code: &'a Code,
         reached: &[NodeId],
         recorded: Recorded,
         scores: bool,
     ) -> Recorder<'a> {
         let view = Reverse {
-            graph: self,
-            code,
+            graph: &self.graph.store,
             marks: Vec::new(),
             order: Vec::new(),
             adjoints: FxHashMap::default(),
@@ -122,7 +117,7 @@ impl Graph {
     }
 }
 
-/// What has been recorded so far.
+/// The part recorded so far.
 pub(in crate::trace) struct Recorded {
     /// The choices that move: their values, or the noise that is stored.
     placed: FxHashMap<NodeId, Form>,
@@ -152,20 +147,20 @@ pub(in crate::trace) struct Recorder<'a> {
     view: Reverse<'a>,
     reached: FxHashSet<NodeId>,
     pub recorded: Recorded,
-    /// Whether scores are recorded with the nodes that have them.
+    /// True if scores are recorded with the nodes that have them.
     scores: bool,
     /// The nodes whose inputs move.
     moving: Vec<NodeId>,
     /// Where the scores are that have been recorded.
     scored: Vec<(NodeId, Scored)>,
-    /// What else of a node moves than its value.
+    /// The parts of nodes that move, besides values.
     besides: FxHashMap<NodeId, Besides>,
 }
 
 impl Recorder<'_> {
     fn place(&mut self, t: Target) -> Option<()> {
-        let (graph, code) = (self.view.graph, self.view.code);
-        let dist = graph.dist_of(code, t.node)?;
+        let graph = self.view.graph;
+        let dist = graph.dist_of(t.node)?;
         let whole = match self.recorded.placed.get(&t.node) {
             Some(form) => form.clone(),
             None => {
@@ -222,7 +217,7 @@ impl Recorder<'_> {
         let is_fixed = |frame, o| self.operand(frame, o).is_fixed();
         let fits = self.moving.iter().all(|n| {
             let Some(given) = given(*n) else { return false };
-            let of = (self.view.graph, self.view.code);
+            let of = self.view.graph;
             !known.insert((*n, given.clone()))
                 || in_place.add_value(of, *n, given, self.form(*n), self.besides.get(n), is_fixed)
         });
@@ -270,12 +265,12 @@ impl Recorder<'_> {
     /// Returns all nodes from which a node's value, score or structure is derived.
     fn reads(&self, n: NodeId) -> Inputs {
         let mut all = self.view.inputs(n, true);
-        self.view.graph.each_dep(self.view.code, n, |d, _| all.push(d));
+        self.view.graph.each_dep(n, |d, _| all.push(d));
         all
     }
 
     fn value(&self, n: NodeId) -> &Value {
-        &self.view.graph.nodes[n as usize].value
+        &self.view.graph[n].value
     }
 
     fn form(&self, n: NodeId) -> Form {
@@ -285,7 +280,7 @@ impl Recorder<'_> {
     fn operand(&self, frame: FrameId, o: Operand) -> Form {
         match self.view.source(frame, o) {
             Some(n) => self.form(n),
-            None => Form::Fixed(self.view.graph.value(self.view.code, frame, o).clone()),
+            None => Form::Fixed(self.view.graph.value(frame, o).clone()),
         }
     }
 
@@ -304,14 +299,15 @@ impl Recorder<'_> {
 
     /// Records the operation of a node; `None` if that is not possible.
     fn record_op(&mut self, n: NodeId) -> Option<Form> {
-        let (graph, code) = (self.view.graph, self.view.code);
-        let frame = graph.nodes[n as usize].frame;
-        let side = graph.nodes[n as usize].side.as_deref();
-        let now = graph.nodes[n as usize].value.clone();
-        match graph.op(code, n) {
+        let graph = self.view.graph;
+        let frame = graph[n].frame;
+        let side = graph[n].side.as_deref();
+        let now = graph[n].value.clone();
+        match graph.op(n) {
             Op::Prim { builtin, args } => {
                 let args = self.operands(frame, args);
-                let form = self.recorded.tape.call(code.builtins.get(*builtin), args, &now)?;
+                let form =
+                    self.recorded.tape.call(graph.code.builtins.get(*builtin), args, &now)?;
                 self.start_from_kept(n, &form);
                 Some(form)
             }
@@ -325,7 +321,7 @@ impl Recorder<'_> {
             }
             Op::Index { base, keys } => {
                 for (form, k) in self.operands(frame, keys).iter().zip(keys.iter()) {
-                    let now = graph.plain(code, frame, *k, &mut Deps::new()).clone();
+                    let now = graph.plain(frame, *k, &mut Deps::new()).clone();
                     self.recorded.tape.guard(form, &now)?;
                 }
                 match graph.resolve(frame, *base) {
@@ -337,7 +333,7 @@ impl Recorder<'_> {
                     None => Some(Form::Fixed(now)),
                 }
             }
-            Op::Param { default, .. } => match (graph.argument(code, n), self.view.passed(n)) {
+            Op::Param { default, .. } => match (graph.argument(n), self.view.passed(n)) {
                 (Some((from, o)), _) => Some(self.operand(from, o)),
                 (None, Some((source, Some(i)))) => self.form(source).position(i),
                 (None, Some((source, None))) => Some(self.form(source)),
@@ -353,10 +349,10 @@ impl Recorder<'_> {
                 if !self.operand(frame, *f).is_fixed() {
                     return None;
                 }
-                let Value::Builtin(i) = graph.value(code, frame, *f) else {
+                let Value::Builtin(i) = graph.value(frame, *f) else {
                     return self.record_call(n);
                 };
-                let builtin = code.builtins.get(*i);
+                let builtin = graph.code.builtins.get(*i);
                 let order = builtin.match_names(args.iter().map(|(k, _)| k.as_deref())).ok()?;
                 let argument = |i: &Option<usize>| match i.and_then(|i| args.get(i)) {
                     Some((_, o)) => self.operand(frame, *o),
@@ -384,8 +380,8 @@ impl Recorder<'_> {
             // Its passes are recorded one by one.
             Op::Map { .. } if matches!(side, Some(Side::Loop(_))) => Some(Form::Fixed(now)),
             Op::Map { f, over, .. } => {
-                let Value::Builtin(i) = graph.value(code, frame, *f) else { return None };
-                let (over, builtin) = (self.operand(frame, *over), code.builtins.get(*i));
+                let Value::Builtin(i) = graph.value(frame, *f) else { return None };
+                let (over, builtin) = (self.operand(frame, *over), graph.code.builtins.get(*i));
                 let one = |(i, now): (usize, Value)| {
                     self.recorded.tape.call(builtin, vec![over.position(i)?], &now)
                 };
@@ -409,7 +405,7 @@ impl Recorder<'_> {
             Op::Draw { dist, keys, .. } => self.record_draw(n, dist, keys),
             Op::Observe { .. } | Op::Factor { .. } if !self.scores => Some(Form::Fixed(now)),
             Op::Observe { dist, value, .. } => {
-                let x = match graph.replaced(code, n) {
+                let x = match graph.replaced(n) {
                     Some(v) => Form::Fixed(v.clone()),
                     None => self.operand(frame, *value),
                 };
@@ -443,12 +439,12 @@ impl Recorder<'_> {
 
     fn guard(&mut self, frame: FrameId, o: Operand) -> Option<()> {
         let form = self.operand(frame, o);
-        self.recorded.tape.guard(&form, self.view.graph.value(self.view.code, frame, o))
+        self.recorded.tape.guard(&form, self.view.graph.value(frame, o))
     }
 
     /// A call of a function of the program, whose frame is fixed.
     fn record_call(&mut self, n: NodeId) -> Option<Form> {
-        match self.view.graph.nodes[n as usize].side.as_deref() {
+        match self.view.graph[n].side.as_deref() {
             Some(Side::MemoCall(c)) if c.deps.iter().any(|d| !self.form(*d).is_fixed()) => None,
             _ => self.handed_on(n),
         }
@@ -463,9 +459,9 @@ impl Recorder<'_> {
     }
 
     fn record_draw(&mut self, n: NodeId, spec: &DistSpec, keys: &[Operand]) -> Option<Form> {
-        let (graph, code) = (self.view.graph, self.view.code);
-        let frame = graph.nodes[n as usize].frame;
-        let dist = graph.dist_of(code, n)?;
+        let graph = self.view.graph;
+        let frame = graph[n].frame;
+        let dist = graph.dist_of(n)?;
         if dist.is_stored_whitened() != graph.is_whitened(n)
             || !self.operands(frame, keys).iter().all(Form::is_fixed)
         {
@@ -498,7 +494,7 @@ impl Recorder<'_> {
             DistSpec::Value(o) => self.operand(frame, *o),
             DistSpec::Family { builtin, args } => {
                 let args = self.operands(frame, args);
-                Builder::made_dist(code.builtins.get(*builtin), args, &dist)
+                Builder::made_dist(graph.code.builtins.get(*builtin), args, &dist)
             }
         };
         let value = self.recorded.tape.coloured(made, &dist, &x)?;
@@ -509,23 +505,24 @@ impl Recorder<'_> {
     }
 
     fn record_score(&mut self, n: NodeId, spec: &DistSpec, x: &Form, observed: bool) -> Option<()> {
-        let (graph, code) = (self.view.graph, self.view.code);
-        let frame = graph.nodes[n as usize].frame;
+        let graph = self.view.graph;
+        let frame = graph[n].frame;
         let mark = self.recorded.tape.mark();
         match spec {
             DistSpec::Family { builtin, args } => {
-                let dist = graph.make_dist(code, n, frame, spec, &mut Deps::new()).ok()?;
+                let dist = graph.make_dist(n, spec).ok()?;
                 let args = self.operands(frame, args);
-                self.recorded.tape.family(code.builtins.get(*builtin), args, &dist, x, observed)?;
-            }
-            DistSpec::Value(o) => {
-                let form = self.operand(frame, *o);
-                self.recorded.tape.distribution(
-                    &form,
-                    graph.value(code, frame, *o),
+                self.recorded.tape.family(
+                    graph.code.builtins.get(*builtin),
+                    args,
+                    &dist,
                     x,
                     observed,
                 )?;
+            }
+            DistSpec::Value(o) => {
+                let form = self.operand(frame, *o);
+                self.recorded.tape.distribution(&form, graph.value(frame, *o), x, observed)?;
             }
         }
         self.note_score(n, mark);
@@ -533,7 +530,7 @@ impl Recorder<'_> {
     }
 }
 
-/// Whether a distribution whose parameters move has a fixed support.
+/// True if a distribution whose parameters move has a fixed support.
 fn has_fixed_support(dist: &Dist, params: &[Form]) -> bool {
     match dist {
         d if !d.has_moving_support() => true,

@@ -59,7 +59,7 @@ impl Trace {
     /// before it is evaluated.
     pub fn record(&mut self, targets: &[Target]) -> Option<Recording> {
         self.rollback();
-        let recorded = self.graph.record(&self.code, targets)?;
+        let recorded = self.record_tape(targets)?;
         Some(Recording::new(self, recorded, targets, SummedChoices::default()))
     }
 }
@@ -119,7 +119,7 @@ impl Recording {
         true
     }
 
-    /// Whether it is valid for the current state of a trace.
+    /// True if it is valid for the current state of a trace.
     pub fn holds(&self, trace: &Trace) -> bool {
         self.revision == trace.graph.revision && Arc::ptr_eq(&self.identity, &trace.identity)
     }
@@ -192,8 +192,8 @@ impl Recording {
         trace.rollback();
         self.here = None;
         let Some(in_place) = &mut self.in_place else { return false };
-        let moved = self.tape.run_at_images(y, here)
-            && in_place.fits(&trace.graph, &trace.code, &self.tape, &[]);
+        let moved =
+            self.tape.run_at_images(y, here) && in_place.fits(&trace.graph, &self.tape, &[]);
         if moved {
             in_place.apply(&mut trace.graph, &trace.code, &self.tape, &[], Some(&self.start));
             trace.keep_moved(&self.targets, self.tape.coarse(here));
@@ -236,7 +236,7 @@ impl Recording {
         if y.is_some()
             && let Some(in_place) = &mut self.in_place
         {
-            if !in_place.fits(&trace.graph, &trace.code, &self.tape, &drawn) {
+            if !in_place.fits(&trace.graph, &self.tape, &drawn) {
                 trace.rollback();
                 return false;
             }

@@ -18,14 +18,14 @@ impl Reverse<'_> {
     /// from, except the choice itself.
     pub(super) fn score_inputs(&self, n: NodeId) -> Inputs {
         let mut all = Inputs::new();
-        let frame = self.graph.nodes[n as usize].frame;
-        match self.graph.op(self.code, n) {
+        let frame = self.graph[n].frame;
+        match self.graph.op(n) {
             // The density of white noise does not depend on the choice's parameters.
             Op::Draw { .. } if self.graph.is_whitened(n) => {}
             Op::Draw { dist, .. } => self.dist_inputs(n, dist, &mut all),
             Op::Observe { dist, value, .. } => {
                 self.dist_inputs(n, dist, &mut all);
-                if self.graph.replaced(self.code, n).is_none() {
+                if self.graph.replaced(n).is_none() {
                     all.extend(self.source(frame, *value));
                 }
             }
@@ -37,12 +37,12 @@ impl Reverse<'_> {
 
     /// Adds the derivatives of one score to the adjoints of its inputs.
     pub(super) fn vjp_score(&mut self, n: NodeId) -> Result<(), Failure> {
-        let (g, code) = (self.graph, self.code);
-        let frame = g.nodes[n as usize].frame;
-        match g.op(code, n) {
+        let g = self.graph;
+        let frame = g[n].frame;
+        match g.op(n) {
             Op::Factor { weight, .. } => self.give(frame, *weight, Adjoint::Num(self.power)),
             Op::Draw { dist: spec, .. } => {
-                let Some(dist) = g.dist_of(code, n) else { return Ok(()) };
+                let Some(dist) = g.dist_of(n) else { return Ok(()) };
                 let Some(stored) = g.stored(n) else { return Ok(()) };
                 let own = self.is_active(n);
                 if g.is_whitened(n) {
@@ -63,10 +63,9 @@ impl Reverse<'_> {
                 self.give_matrix(n, spec, &dist, &stored, &[], self.weight)?;
             }
             Op::Observe { dist: spec, value, .. } => {
-                let mut deps = Deps::new();
-                let observed = g.observed_value(code, n, *value, &mut deps);
+                let observed = g.observed_value(n);
                 if let DistSpec::Value(o) = spec
-                    && let Value::Likelihood(l) = g.value(code, frame, *o)
+                    && let Value::Likelihood(l) = g.value(frame, *o)
                 {
                     let Some(mut by) = l.gradient(observed) else {
                         return Err(
@@ -77,13 +76,13 @@ impl Reverse<'_> {
                     self.give(frame, *o, by);
                     return Ok(());
                 }
-                let dist = g.make_dist(code, n, frame, spec, &mut deps)?;
+                let dist = g.make_dist(n, spec)?;
                 let Some((mut by_x, mut params)) = density::gradient(&dist, observed) else {
                     return Err(self.no_density_derivative(n, &dist, observed));
                 };
                 by_x.scale(self.power);
                 params.iter_mut().for_each(|p| *p *= self.power);
-                if g.replaced(code, n).is_none() {
+                if g.replaced(n).is_none() {
                     self.give(frame, *value, by_x);
                 }
                 self.give_params(n, spec, &dist, params)?;
@@ -106,7 +105,7 @@ impl Reverse<'_> {
             return self.no_derivative(n, &format!("the density of `{}`", dist.name()));
         }
         let message = format!("the density of `{}` is not finite here", dist.name());
-        self.graph.fail(self.code, n, FaultKind::Domain, message, None)
+        self.graph.fail(n, FaultKind::Domain, message, None)
     }
 
     /// Adds the derivatives with respect to a distribution's parameters to the nodes they
@@ -118,11 +117,11 @@ impl Reverse<'_> {
         dist: &Dist,
         params: Vec<f64>,
     ) -> Result<(), Failure> {
-        let frame = self.graph.nodes[n as usize].frame;
+        let frame = self.graph[n].frame;
         match spec {
             DistSpec::Value(o) => self.give(frame, *o, Adjoint::Array(params)),
             DistSpec::Family { builtin, args } => {
-                let builtin = self.code.builtins.get(*builtin);
+                let builtin = self.graph.code.builtins.get(*builtin);
                 let values = self.values(frame, args);
                 let mut argument_adjoints =
                     density::by_arguments(&Args { builtin, values: &values }, dist, &params);
@@ -148,7 +147,7 @@ impl Reverse<'_> {
         by_value: &[f64],
         weight: f64,
     ) -> Result<(), Failure> {
-        let frame = self.graph.nodes[n as usize].frame;
+        let frame = self.graph[n].frame;
         let values = self.values(frame, spec.operands());
         let i = match spec {
             DistSpec::Value(_) => density::matrix(dist, &[]).map(|_| 0),
@@ -169,7 +168,7 @@ impl Reverse<'_> {
                 Some(Adjoint::Array(all))
             }
             DistSpec::Family { builtin, .. } => density::by_matrix(
-                &Args { builtin: self.code.builtins.get(*builtin), values: &values },
+                &Args { builtin: self.graph.code.builtins.get(*builtin), values: &values },
                 dist,
                 &by,
             ),

@@ -17,9 +17,9 @@ impl Reverse<'_> {
     /// move its support.
     pub(super) fn inputs(&self, n: NodeId, target: bool) -> Inputs {
         let (g, mut all) = (self.graph, Inputs::new());
-        let frame = g.nodes[n as usize].frame;
-        let side = g.nodes[n as usize].side.as_deref();
-        match g.op(self.code, n) {
+        let frame = g[n].frame;
+        let side = g[n].side.as_deref();
+        match g.op(n) {
             Op::Prim { args, .. } | Op::Array(args) => {
                 all.extend(args.iter().filter_map(|o| self.source(frame, *o)));
             }
@@ -28,7 +28,7 @@ impl Reverse<'_> {
             }
             Op::Index { .. } => all.extend(self.indexed(n).map(|(source, _)| source)),
             Op::Param { default, .. } => {
-                all.extend(match g.argument(self.code, n) {
+                all.extend(match g.argument(n) {
                     Some((from, o)) => self.source(from, o),
                     None => self
                         .passed(n)
@@ -43,9 +43,11 @@ impl Reverse<'_> {
                 }
             }
             Op::Call { .. } | Op::If { .. } | Op::Fold { .. } => match side {
-                Some(Side::Child(c)) if c.result != NONE => all.push(self.whole(c.result)),
-                Some(Side::MemoCall(c)) if c.result != NONE => all.push(self.whole(c.result)),
-                Some(Side::Loop(l)) if l.result != NONE => all.push(self.whole(l.result)),
+                Some(Side::Child(c)) if c.result != NodeId::NONE => all.push(self.whole(c.result)),
+                Some(Side::MemoCall(c)) if c.result != NodeId::NONE => {
+                    all.push(self.whole(c.result))
+                }
+                Some(Side::Loop(l)) if l.result != NodeId::NONE => all.push(self.whole(l.result)),
                 // A built-in function value was called.
                 Some(Side::Deps(deps) | Side::Kept(Kept { deps, .. })) => {
                     all.extend(deps.iter().map(|d| self.whole(*d)))
@@ -59,7 +61,7 @@ impl Reverse<'_> {
             }
             Op::Draw { dist, .. } => {
                 let moves = |d: Dist| d.is_stored_whitened() || target && d.has_moving_support();
-                if g.dist_of(self.code, n).is_some_and(moves) {
+                if g.dist_of(n).is_some_and(moves) {
                     self.dist_inputs(n, dist, &mut all);
                 }
             }
@@ -69,8 +71,8 @@ impl Reverse<'_> {
     }
 
     fn whole(&self, n: NodeId) -> NodeId {
-        match &self.graph.nodes[n as usize].value {
-            Value::Container(r) => r.node + 1,
+        match &self.graph[n].value {
+            Value::Container(r) => r.node.gather(),
             _ => n,
         }
     }
@@ -78,10 +80,10 @@ impl Reverse<'_> {
     /// Propagates an adjoint to the inputs of a node.
     pub(super) fn vjp(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
         let g = self.graph;
-        let frame = g.nodes[n as usize].frame;
-        match g.op(self.code, n) {
+        let frame = g[n].frame;
+        match g.op(n) {
             Op::Prim { builtin, args } => {
-                let builtin = self.code.builtins.get(*builtin);
+                let builtin = self.graph.code.builtins.get(*builtin);
                 self.vjp_builtin(n, builtin, args, by)?;
             }
             Op::Array(items) => {
@@ -97,11 +99,11 @@ impl Reverse<'_> {
             Op::Index { .. } => {
                 if let Some((source, keys)) = self.indexed(n) {
                     let mut whole = Adjoint::Zero;
-                    whole.add_at(&g.nodes[source as usize].value, &keys, by.clone());
+                    whole.add_at(&g[source].value, &keys, by.clone());
                     self.give_node(source, whole);
                 }
             }
-            Op::Param { default, .. } => match (g.argument(self.code, n), self.passed(n)) {
+            Op::Param { default, .. } => match (g.argument(n), self.passed(n)) {
                 (Some((from, o)), _) => self.give(from, o, by.clone()),
                 (None, Some((source, Some(i)))) => self.give_part(source, i, by),
                 (None, Some((source, None))) => self.give_node(source, by.clone()),
@@ -138,13 +140,13 @@ impl Reverse<'_> {
 
     /// Returns the alternative that a selection takes.
     pub(super) fn taken(&self, n: NodeId) -> Option<Operand> {
-        let Op::Select { then, otherwise, .. } = self.graph.op(self.code, n) else { return None };
-        Some(if self.graph.nodes[n as usize].flags & OTHERWISE == 0 { *then } else { *otherwise })
+        let Op::Select { then, otherwise, .. } = self.graph.op(n) else { return None };
+        Some(if self.graph[n].flags & OTHERWISE == 0 { *then } else { *otherwise })
     }
 
     fn give_part(&mut self, source: NodeId, i: usize, by: &Adjoint) {
         let mut whole = Adjoint::Zero;
-        whole.add_position(&self.graph.nodes[source as usize].value, i, by.clone());
+        whole.add_position(&self.graph[source].value, i, by.clone());
         self.give_node(source, whole);
     }
 
@@ -152,15 +154,13 @@ impl Reverse<'_> {
     /// element, or `None` if the parameter gets the whole value.
     pub(super) fn passed(&self, n: NodeId) -> Option<(NodeId, Option<usize>)> {
         let g = self.graph;
-        let f = &g.frames[g.nodes[n as usize].frame as usize];
-        let slot = n - f.base;
-        let element = match (&f.args, g.op(self.code, n)) {
-            (_, Op::Item) | (Arguments::Item, _) => {
-                slot == 0 || matches!(g.op(self.code, n), Op::Item)
-            }
+        let f = &g[g[n].frame];
+        let slot = (n - f.base).0;
+        let element = match (&f.args, g.op(n)) {
+            (_, Op::Item) | (Arguments::Item, _) => slot == 0 || matches!(g.op(n), Op::Item),
             (Arguments::Fold, _) if slot == 1 => true,
             (Arguments::Fold, _) if slot == 0 => {
-                return match g.nodes[n as usize].side.as_deref() {
+                return match g[n].side.as_deref() {
                     Some(Side::Deps(deps)) => deps.first().map(|d| (self.whole(*d), None)),
                     _ => None,
                 };
@@ -170,8 +170,8 @@ impl Reverse<'_> {
         if !element {
             return None;
         }
-        let home = g.nodes[f.owner as usize].frame;
-        let over = match g.op(self.code, f.owner) {
+        let home = g[f.owner].frame;
+        let over = match g.op(f.owner) {
             Op::For { iter, .. } => *iter,
             Op::Map { over, .. } | Op::Fold { over, .. } => *over,
             _ => return None,
@@ -183,22 +183,22 @@ impl Reverse<'_> {
     /// from, and those keys.
     pub(super) fn indexed(&self, n: NodeId) -> Option<(NodeId, SmallVec<[Value; 2]>)> {
         let g = self.graph;
-        let frame = g.nodes[n as usize].frame;
-        let Op::Index { base, keys } = g.op(self.code, n) else { return None };
+        let frame = g[n].frame;
+        let Op::Index { base, keys } = g.op(n) else { return None };
         let mut gathered = Deps::new();
         let mut rest: SmallVec<[Value; 2]> =
-            keys.iter().map(|k| g.plain(self.code, frame, *k, &mut gathered).clone()).collect();
-        let found: &[NodeId] = match g.nodes[n as usize].side.as_deref() {
+            keys.iter().map(|k| g.plain(frame, *k, &mut gathered).clone()).collect();
+        let found: &[NodeId] = match g[n].side.as_deref() {
             Some(Side::Deps(deps)) => &deps[gathered.len().min(deps.len())..],
             _ => &[],
         };
         let mut found = found.iter();
         let mut source = g.resolve(frame, *base)?;
         while !rest.is_empty() {
-            let Value::Container(r) = &g.nodes[source as usize].value else { break };
+            let Value::Container(r) = &g[source].value else { break };
             let next = *found.next()?;
-            if next != r.node + 1 {
-                let width = g.key_width(self.code, r.node).min(rest.len());
+            if next != r.node.gather() {
+                let width = g.key_width(r.node).min(rest.len());
                 rest.drain(..width);
             }
             source = next;
@@ -207,14 +207,14 @@ impl Reverse<'_> {
     }
 
     fn vjp_gather(&mut self, n: NodeId, by: &Adjoint) -> Result<(), Failure> {
-        if !matches!(self.graph.nodes[n as usize].side.as_deref(), Some(Side::Deps(_))) {
+        if !matches!(self.graph[n].side.as_deref(), Some(Side::Deps(_))) {
             return Ok(());
         }
         let Some(elements) = self.gathered(n) else {
             return Err(self.no_derivative(n, "the result of this map"));
         };
         for (i, d) in elements.into_iter().enumerate() {
-            let part = match &self.graph.nodes[n as usize].value {
+            let part = match &self.graph[n].value {
                 Value::Record(r) => {
                     r.get_index(i).map_or(Adjoint::Zero, |(name, _)| by.field(name))
                 }
@@ -229,13 +229,10 @@ impl Reverse<'_> {
     /// if some elements are constants.
     pub(super) fn gathered(&self, n: NodeId) -> Option<Inputs> {
         let g = self.graph;
-        let Some(Side::Deps(deps)) = g.nodes[n as usize].side.as_deref() else { return None };
-        let nested = deps
-            .iter()
-            .filter(|d| matches!(g.nodes[**d as usize].value, Value::Container(_)))
-            .count();
+        let Some(Side::Deps(deps)) = g[n].side.as_deref() else { return None };
+        let nested = deps.iter().filter(|d| matches!(g[**d].value, Value::Container(_))).count();
         let elements = &deps[..deps.len() - nested];
-        let count = match &g.nodes[n as usize].value {
+        let count = match &g[n].value {
             Value::Record(r) => r.len(),
             v => v.len().unwrap_or(0),
         };
@@ -244,7 +241,7 @@ impl Reverse<'_> {
 
     /// A choice stored as white noise moves with its mean and covariance.
     fn vjp_noncentred(&mut self, n: NodeId, dist: &DistSpec, by: &Adjoint) -> Result<(), Failure> {
-        let Some(d) = self.graph.dist_of(self.code, n) else { return Ok(()) };
+        let Some(d) = self.graph.dist_of(n) else { return Ok(()) };
         let Some(size) = self.graph.stored(n).and_then(|z| z.len()) else { return Ok(()) };
         // value = mean + L z
         let by = by.numbers(size);
@@ -263,8 +260,8 @@ impl Reverse<'_> {
         targets: &[Target],
         by: &Adjoint,
     ) -> Result<(), Failure> {
-        let Op::Draw { dist: spec, .. } = self.graph.op(self.code, n) else { return Ok(()) };
-        let Some(dist) = self.graph.dist_of(self.code, n) else { return Ok(()) };
+        let Op::Draw { dist: spec, .. } = self.graph.op(n) else { return Ok(()) };
+        let Some(dist) = self.graph.dist_of(n) else { return Ok(()) };
         if dist.is_stored_whitened() {
             return self.vjp_noncentred(n, spec, by);
         }

@@ -47,7 +47,7 @@ impl Requested {
         }
     }
 
-    /// Whether each of these is needed, under some assignment, by a score or by a choice
+    /// True if each of these is needed, under some assignment, by a score or by a choice
     /// that is needed.
     fn has_all(&self, choices: &[Target]) -> bool {
         let mut all = self.by_scores.clone();
@@ -194,7 +194,7 @@ impl Trace {
                     }
                     None => {}
                 }
-                let mut reader = Reader::new(&self.graph, &self.code, &own, &mut m.partition);
+                let mut reader = Reader::new(&self.graph, &own, &mut m.partition);
                 reader.read_all(self.all_targets().iter().map(|t| t.node));
                 if strict {
                     asked.enter(&reader, self.all_targets());
@@ -235,15 +235,14 @@ impl Trace {
     ) -> TraceResult<Result<Weight, Label>> {
         self.rollback();
         let before = self.graph.begin();
-        self.graph.draws = draws;
-        self.graph.queue(&self.code, changes);
+        self.graph.update.draws = draws;
+        self.graph.update.queue(&mut self.graph.store, &self.code, changes);
         match self.graph.propagate(&self.code) {
             Err(e) if e.is_recoverable() => {
-                let failed = std::mem::take(&mut self.graph.failed);
+                let failed = std::mem::take(&mut self.graph.update.failed);
                 let new = failed.last().filter(|n| self.is_improper_draw(**n)).copied();
-                let label = Reader::new(&self.graph, &self.code, own, &mut m.partition)
-                    .read_failed(&failed);
-                self.graph.rollback(&self.code, before);
+                let label = Reader::new(&self.graph, own, &mut m.partition).read_failed(&failed);
+                self.graph.rollback(before);
                 match new {
                     Some(node) => Err(self.cannot_sum(
                         Target { node, element: NONE },
@@ -256,7 +255,7 @@ impl Trace {
             // that replaces it.
             Err(e) if e.kind == FaultKind::Duplicate => {
                 let refused = self.check_held(m.sites[0]).err();
-                self.graph.rollback(&self.code, before);
+                self.graph.rollback(before);
                 Err(refused.unwrap_or(e))
             }
             propagated => self.pend(before, propagated).map(Ok),
@@ -264,8 +263,8 @@ impl Trace {
     }
 
     fn is_improper_draw(&self, n: NodeId) -> bool {
-        matches!(self.graph.op(&self.code, n), Op::Draw { .. })
-            && self.graph.dist_of(&self.code, n).is_some_and(|d| d.is_improper())
+        matches!(self.graph.op(n), Op::Draw { .. })
+            && self.graph.dist_of(n).is_some_and(|d| d.is_improper())
     }
 
     /// Fails if a detached frame contains a held choice, or a loop around one.
@@ -276,17 +275,16 @@ impl Trace {
         }
     }
 
-    /// Whether the pending update detaches a frame that contains a held choice, or a loop
+    /// True if the pending update detaches a frame that contains a held choice, or a loop
     /// around one.
     pub(super) fn detaches_held(&self) -> bool {
         let g = &self.graph;
         let stays = |f: &FrameId| {
-            let frame = &g.frames[*f as usize];
-            let mut nodes =
-                frame.base..frame.base + self.code.blocks[frame.block as usize].len() as u32;
-            nodes.any(|n| g.nodes[n as usize].refs > 0)
+            let frame = &g.store[*f];
+            let mut slots = self.code.blocks[frame.block].slots();
+            slots.any(|s| g.store[frame.base + s].refs > 0)
         };
-        g.detached.iter().any(stays)
+        g.update.detached.iter().any(stays)
     }
 }
 

@@ -179,12 +179,12 @@ impl Trace {
             self.graph.acquire(*n, *n, false);
             self.hold_frames(*n, held);
         }
-        self.graph.commit(&self.code);
+        self.graph.commit();
         held.nodes.extend(new);
         held.nodes.sort_unstable();
         let makes_observations = |f: &&FrameId| {
-            let block = self.graph.frames[**f as usize].block;
-            !self.code.blocks[block as usize].effects.is_empty()
+            let block = self.graph.store[**f].block;
+            !self.code.blocks[block].effects.is_empty()
         };
         match held.frames.iter().find(makes_observations) {
             Some(_) => {
@@ -198,28 +198,27 @@ impl Trace {
     /// Holds the loops and the entries of `mem` functions that contain a choice, as code
     /// that reads or calls them would.
     fn hold_frames(&mut self, n: NodeId, held: &mut Held) {
-        let mut f = self.graph.nodes[n as usize].frame;
-        while self.graph.frames[f as usize].owner != NONE {
-            let (owner, key) =
-                (self.graph.frames[f as usize].owner, self.graph.frames[f as usize].key.clone());
-            if let Some(Side::Memo(m)) = self.graph.nodes[owner as usize].side.as_deref_mut()
+        let mut f = self.graph.store[n].frame;
+        while self.graph.store[f].owner != NodeId::NONE {
+            let (owner, key) = (self.graph.store[f].owner, self.graph.store[f].key.clone());
+            if let Some(Side::Memo(m)) = self.graph.store[owner].side.as_deref_mut()
                 && let Some(key) = key
                 && let Some(entry) = m.entries.get_mut(&key)
                 && !held.frames.contains(&f)
             {
                 let old = *entry;
                 entry.1 += 1;
-                self.graph.note(Entry::Memo(owner, key.clone(), Some(old)));
+                self.graph.update.note(Entry::Memo(owner, key.clone(), Some(old)));
                 held.frames.push(f);
                 held.entries.push((owner, key));
             }
-            if matches!(self.graph.op(&self.code, owner), Op::For { .. } | Op::Map { .. })
+            if matches!(self.graph.op(owner), Op::For { .. } | Op::Map { .. })
                 && !held.loops.contains(&owner)
             {
                 self.graph.acquire(owner, owner, false);
                 held.loops.push(owner);
             }
-            f = self.graph.nodes[owner as usize].frame;
+            f = self.graph.store[owner].frame;
         }
     }
 

@@ -54,10 +54,10 @@ pub struct Elimination {
     /// it.
     reached: FxHashMap<NodeId, usize>,
     owners: FxHashMap<NodeId, usize>,
-    /// Whether this is valid at a single point only, because what is read depends on
+    /// True if this is valid at a single point only, because what is read depends on
     /// choices that the kernel moves.
     pub structure_moves: bool,
-    /// Whether the distributions of the choices depend on choices that the kernel moves.
+    /// True if the distributions of the choices depend on choices that the kernel moves.
     values_move: bool,
 }
 
@@ -107,40 +107,32 @@ impl Elimination {
 }
 
 impl Trace {
-    /// Whether what is read, and thus which choices exist, depends on choices of a kind,
+    /// True if what is read, and thus which choices exist, depends on choices of a kind,
     /// as far as the current state shows.
     pub fn structure_depends_on(&self, kind: ChoiceKind) -> bool {
         let selector = Selector::Kind(kind);
-        let moving =
-            self.all_targets().iter().filter(|t| self.graph.selects(&self.code, &selector, t));
+        let moving = self.all_targets().iter().filter(|t| self.graph.selects(&selector, t));
         let own = moving.map(|t| (t.node, Label { site: NONE, moves: true, set: 0 })).collect();
         let mut partition = Partition::default();
         partition.grow(1);
-        let mut reader = Reader::new(&self.graph, &self.code, &own, &mut partition);
+        let mut reader = Reader::new(&self.graph, &own, &mut partition);
         reader.read_all(std::iter::empty());
         reader.found.structure_moves
     }
 
     /// Returns the group that a score belongs to.
-    pub fn group_of(&self, elimination: &Elimination, score: u32) -> Option<usize> {
+    pub fn group_of(&self, elimination: &Elimination, score: NodeId) -> Option<usize> {
         if let Some(group) = elimination.reached.get(&score) {
             return Some(*group);
         }
-        if elimination.owners.is_empty()
-            || matches!(self.graph.op(&self.code, score), Op::Draw { .. })
-        {
+        if elimination.owners.is_empty() || matches!(self.graph.op(score), Op::Draw { .. }) {
             return None;
         }
-        let mut n = score;
-        let mut found = None;
-        while n != NONE {
-            found = elimination.owners.get(&n).copied().or(found);
-            n = self.graph.frames[self.graph.nodes[n as usize].frame as usize].owner;
-        }
-        found
+        let around = std::iter::once(score).chain(self.graph.owners(score));
+        around.filter_map(|n| elimination.owners.get(&n).copied()).last()
     }
 
-    /// Whether the choices have the same supports in the current state (including a
+    /// True if the choices have the same supports in the current state (including a
     /// pending proposal) as at the start of the step.
     pub fn has_same_values(&self, m: &Marginal) -> bool {
         !m.elimination.values_move || self.moved_support(m).is_none()
@@ -160,12 +152,13 @@ impl Trace {
         let tempered = |prior: &ExactSum, likelihood: &ExactSum| {
             prior.value() + if power == 0.0 { 0.0 } else { power * likelihood.value() }
         };
-        let (mut prior, mut likelihood) = (self.graph.prior.clone(), self.graph.likelihood.clone());
+        let (mut prior, mut likelihood) =
+            (self.graph.score.prior.clone(), self.graph.score.likelihood.clone());
         terms.clear();
         for group in &elimination.groups {
             let (mut own_prior, mut own_likelihood) = (ExactSum::default(), ExactSum::default());
             for n in &group.scores {
-                self.graph.put_scored(&self.code, *n, &mut own_prior, &mut own_likelihood);
+                self.graph.put_scored(*n, &mut own_prior, &mut own_likelihood);
             }
             group.owners.iter().for_each(|n| self.put_scores_below(*n, &mut own_likelihood));
             terms.push(tempered(&own_prior, &own_likelihood));
@@ -180,19 +173,19 @@ impl Trace {
         let mut open = vec![owner];
         while let Some(n) = open.pop() {
             let mut frame = |f: FrameId| {
-                let frame = &self.graph.frames[f as usize];
-                let effects = &self.code.blocks[frame.block as usize].effects;
-                for m in effects.iter().map(|s| frame.base + s).filter(|m| self.is_clean(*m)) {
-                    match self.graph.op(&self.code, m) {
+                let frame = &self.graph.store[f];
+                let effects = &self.code.blocks[frame.block].effects;
+                for m in effects.iter().map(|s| frame.base + *s).filter(|m| self.is_clean(*m)) {
+                    match self.graph.op(m) {
                         Op::Observe { .. } | Op::Factor { .. } => self.graph.put_score(m, to),
                         _ => open.push(m),
                     }
                 }
             };
-            match self.graph.nodes[n as usize].side.as_deref() {
+            match self.graph.store[n].side.as_deref() {
                 Some(Side::Child(c)) => frame(c.frame),
                 Some(Side::Loop(l)) => {
-                    l.frames.iter().filter(|f| **f != NONE).for_each(|f| frame(*f))
+                    l.frames.iter().filter(|f| **f != FrameId::NONE).for_each(|f| frame(*f))
                 }
                 Some(Side::Memo(m)) => m.entries.values().for_each(|(f, _)| frame(*f)),
                 _ => {}
@@ -201,7 +194,7 @@ impl Trace {
     }
 
     fn is_clean(&self, n: NodeId) -> bool {
-        self.graph.nodes[n as usize].state == State::Clean
+        self.graph.store[n].state == State::Clean
     }
 
     fn cannot_sum(&self, t: Target, why: &str) -> Box<RunError> {

@@ -7,10 +7,10 @@
 //! values: a value that is equal for two values of a choice may differ for a third.
 
 use super::partition::Partition;
-use crate::lang::code::{Callee, Code, Op, Operand};
+use crate::lang::code::Op;
 use crate::trace::gradient::Given;
-use crate::trace::graph::Graph;
 use crate::trace::node::*;
+use crate::trace::store::Store;
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 
@@ -22,7 +22,7 @@ pub(super) struct Label {
     /// One of the summed-out choices, which represents its group; [`NONE`] if there is
     /// none.
     pub site: u32,
-    /// Whether it depends on a choice that the kernel moves.
+    /// True if it depends on a choice that the kernel moves.
     pub moves: bool,
     /// All of the summed-out choices, if [`Sets`] are kept.
     pub set: u32,
@@ -35,7 +35,7 @@ const NOTHING: Label = Label { site: NONE, moves: false, set: 0 };
 pub(super) struct Sets {
     all: Vec<SmallVec<[u32; 4]>>,
     unions: FxHashMap<(u32, u32), u32>,
-    /// Whether a set has become too large.
+    /// True if a set has become too large.
     pub overflow: bool,
 }
 
@@ -93,7 +93,7 @@ enum Visit {
     Done,
 }
 
-/// What was found in one state.
+/// The findings in one state.
 #[derive(Debug, Default)]
 pub(super) struct Found {
     /// Scores that depend on a choice: the node, and one choice of the group.
@@ -107,17 +107,17 @@ pub(super) struct Found {
     pub factors: Vec<(NodeId, u32)>,
     /// The choices that observations and factors depend on.
     pub asked: Vec<NodeId>,
-    /// Whether what is read depends on choices that the kernel moves.
+    /// True if what is read depends on choices that the kernel moves.
     pub structure_moves: bool,
-    /// Whether what is read, or which nodes exist, depends on choices that are summed out.
+    /// True if what is read, or which nodes exist, depends on choices that are summed out.
     pub structure_varies: bool,
-    /// Whether the distributions of choices that are summed out depend on choices that
+    /// True if the distributions of choices that are summed out depend on choices that
     /// the kernel moves.
     pub values_move: bool,
-    /// Whether observations are made in a `mem` function: any choice may decide whether
+    /// True if observations are made in a `mem` function: any choice may decide whether
     /// they exist.
     pub anywhere: bool,
-    /// Whether the existence of observations depends on choices in a way that is not
+    /// True if the existence of observations depends on choices in a way that is not
     /// tracked.
     pub unclear: bool,
 }
@@ -132,8 +132,7 @@ impl Found {
 }
 
 pub(super) struct Reader<'a> {
-    graph: &'a Graph,
-    code: &'a Code,
+    graph: &'a Store,
     /// Choices that are summed out, and those that move.
     own: &'a FxHashMap<NodeId, Label>,
     partition: &'a mut Partition,
@@ -145,23 +144,21 @@ pub(super) struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     pub fn new(
-        graph: &'a Graph,
-        code: &'a Code,
+        graph: &'a Store,
         own: &'a FxHashMap<NodeId, Label>,
         partition: &'a mut Partition,
     ) -> Self {
-        let n = graph.nodes.len();
+        let n = graph.len();
         let (seen, labels) = (vec![Visit::Not; n], vec![NOTHING; n]);
         let found = Found::default();
-        Reader { graph, code, own, partition, seen, labels, found, sets: None }
+        Reader { graph, own, partition, seen, labels, found, sets: None }
     }
 
     /// Returns through which of their values, given by their indices, the choices determine
     /// each node, if sets are kept; `None` for nodes whose existence depends on some, or that
     /// depend on too many to tell.
     pub fn given(&mut self, indices: &[usize]) -> FxHashMap<NodeId, Option<Given>> {
-        let exists = |n: &NodeId| self.graph.nodes[*n as usize].state == State::Clean;
-        let all: Vec<NodeId> = (0..self.graph.nodes.len() as NodeId).filter(exists).collect();
+        let all: Vec<NodeId> = self.graph.clean().collect();
         let at = |x: &u32| (*x, indices[*x as usize] as u32);
         all.into_iter().map(|n| (n, self.reads(n).map(|x| x.iter().map(at).collect()))).collect()
     }
@@ -175,12 +172,8 @@ impl<'a> Reader<'a> {
     /// Follows every score, and merges the groups of choices that one score reads.
     /// `choices` are those of the trace.
     pub fn read_all(&mut self, choices: impl Iterator<Item = NodeId>) {
-        for n in 0..self.graph.nodes.len() as NodeId {
-            if self.graph.nodes[n as usize].state == State::Clean
-                && self.graph.slot_facts(self.code, n).is_effect
-            {
-                self.read_effect(n);
-            }
+        for n in self.graph.clean().filter(|n| self.graph.slot_facts(*n).is_effect) {
+            self.read_effect(n);
         }
         let asked = self.found.asked.len();
         // Held choices have scores too, even if nothing depends on them.
@@ -195,7 +188,7 @@ impl<'a> Reader<'a> {
         let (mut open, mut seen, mut found) = (self.inputs(n), FxHashSet::default(), Vec::new());
         while let Some(d) = open.pop() {
             if seen.insert(d) {
-                match self.graph.op(self.code, d) {
+                match self.graph.op(d) {
                     Op::Draw { .. } => found.push(d),
                     _ => open.extend(self.inputs(d)),
                 }
@@ -211,7 +204,7 @@ impl<'a> Reader<'a> {
             let (placed, _) = self.placed(*n);
             label = self.join(label, placed);
             for d in self.inputs(*n) {
-                if self.graph.nodes[d as usize].state == State::Clean {
+                if self.graph[d].state == State::Clean {
                     let read = self.visit(d);
                     label = self.join(label, read);
                 }
@@ -224,8 +217,7 @@ impl<'a> Reader<'a> {
     fn read_effect(&mut self, n: NodeId) {
         let read = self.visit(n);
         let (placed, owner) = self.placed(n);
-        let is_score =
-            matches!(self.graph.op(self.code, n), Op::Observe { .. } | Op::Factor { .. });
+        let is_score = matches!(self.graph.op(n), Op::Observe { .. } | Op::Factor { .. });
         let own = if is_score { read } else { self.decided(n) };
         let label = self.join(own, placed);
         if label.site != NONE {
@@ -249,21 +241,21 @@ impl<'a> Reader<'a> {
 
     /// Returns what a node's value depends on.
     fn visit(&mut self, root: NodeId) -> Label {
-        if self.seen[root as usize] != Visit::Not {
-            return self.labels[root as usize];
+        if self.seen[root] != Visit::Not {
+            return self.labels[root];
         }
         let mut stack: Vec<(NodeId, Inputs, usize, Label)> =
             vec![(root, self.inputs(root), 0, NOTHING)];
-        self.seen[root as usize] = Visit::Open;
+        self.seen[root] = Visit::Open;
         while let Some((n, inputs, next, label)) = stack.last_mut() {
             if let Some(input) = inputs.get(*next).copied() {
-                if self.seen[input as usize] == Visit::Not {
-                    self.seen[input as usize] = Visit::Open;
+                if self.seen[input] == Visit::Not {
+                    self.seen[input] = Visit::Open;
                     let inner = self.inputs(input);
                     stack.push((input, inner, 0, NOTHING));
                 } else {
                     *next += 1;
-                    let (own, read) = (*label, self.labels[input as usize]);
+                    let (own, read) = (*label, self.labels[input]);
                     let joined = self.join(own, read);
                     if let Some((_, _, _, label)) = stack.last_mut() {
                         *label = joined;
@@ -273,15 +265,15 @@ impl<'a> Reader<'a> {
             }
             let (n, read) = (*n, *label);
             stack.pop();
-            self.labels[n as usize] = self.ended(n, read);
-            self.seen[n as usize] = Visit::Done;
+            self.labels[n] = self.ended(n, read);
+            self.seen[n] = Visit::Done;
         }
-        self.labels[root as usize]
+        self.labels[root]
     }
 
     /// Returns what the value of a node depends on, given what its inputs depend on.
     fn ended(&mut self, n: NodeId, read: Label) -> Label {
-        if !matches!(self.graph.op(self.code, n), Op::Draw { .. }) {
+        if !matches!(self.graph.op(n), Op::Draw { .. }) {
             let open = read.moves && !self.found.structure_moves
                 || read.site != NONE && !self.found.structure_varies;
             if open {
@@ -310,17 +302,17 @@ impl<'a> Reader<'a> {
     /// Returns all nodes that a node's value or structure is computed from.
     fn inputs(&self, n: NodeId) -> Inputs {
         let (g, mut all) = (self.graph, Inputs::new());
-        g.each_dep(self.code, n, |d, _| all.push(d));
-        let frame = &g.frames[g.nodes[n as usize].frame as usize];
-        let of_a_pass = match g.op(self.code, n) {
+        g.each_dep(n, |d, _| all.push(d));
+        let frame = &g[g[n].frame];
+        let of_a_pass = match g.op(n) {
             Op::Item => true,
             Op::Param { .. } => matches!(frame.args, Arguments::Item | Arguments::Fold),
             _ => false,
         };
-        if of_a_pass && frame.owner != NONE {
-            let home = g.nodes[frame.owner as usize].frame;
-            g.op(self.code, frame.owner).operands(|o| all.extend(g.resolve(home, o)));
-            if let Some(Side::Loop(l)) = g.nodes[frame.owner as usize].side.as_deref() {
+        if of_a_pass && frame.owner != NodeId::NONE {
+            let home = g[frame.owner].frame;
+            g.op(frame.owner).operands(|o| all.extend(g.resolve(home, o)));
+            if let Some(Side::Loop(l)) = g[frame.owner].side.as_deref() {
                 all.extend(l.deps.iter().copied());
             }
         }
@@ -330,7 +322,7 @@ impl<'a> Reader<'a> {
     /// Returns what decides which nodes a node reads, and which of them exist.
     fn decided(&mut self, n: NodeId) -> Label {
         let mut all = Inputs::new();
-        self.graph.deciders(self.code, n, |d| all.push(d));
+        self.graph.deciders(n, |d| all.push(d));
         let mut label = NOTHING;
         for d in all {
             let read = self.visit(d);
@@ -344,10 +336,10 @@ impl<'a> Reader<'a> {
     /// have other nodes each time.
     fn placed(&mut self, n: NodeId) -> (Label, Option<NodeId>) {
         let (mut label, mut outermost, mut in_memo) = (NOTHING, None, false);
-        let mut owner = self.graph.frames[self.graph.nodes[n as usize].frame as usize].owner;
-        while owner != NONE {
+        let mut owner = self.graph[self.graph[n].frame].owner;
+        while owner != NodeId::NONE {
             let mut decided = self.decided(owner);
-            if matches!(self.graph.op(self.code, owner), Op::Mem { .. }) {
+            if matches!(self.graph.op(owner), Op::Mem { .. }) {
                 // Its entries exist for calls that may be anywhere, so every choice may
                 // decide.
                 self.found.anywhere = true;
@@ -357,44 +349,12 @@ impl<'a> Reader<'a> {
                 self.found.unclear |= in_memo;
                 outermost = Some(owner);
             }
-            in_memo |= matches!(self.graph.op(self.code, owner), Op::Mem { .. });
+            in_memo |= matches!(self.graph.op(owner), Op::Mem { .. });
             label = self.join(label, decided);
-            owner = self.graph.frames[self.graph.nodes[owner as usize].frame as usize].owner;
+            owner = self.graph[self.graph[owner].frame].owner;
         }
         self.found.structure_moves |= label.moves;
         self.found.structure_varies |= label.site != NONE;
         (label, outermost)
-    }
-}
-
-impl Graph {
-    /// Calls `f` with the nodes whose values decide which other nodes a node reads, and
-    /// which frames it has.
-    pub(in crate::trace) fn deciders(&self, code: &Code, n: NodeId, mut f: impl FnMut(NodeId)) {
-        let node = &self.nodes[n as usize];
-        let mut operand = |o: &Operand| {
-            if let Some(d) = self.resolve(node.frame, *o) {
-                f(d);
-            }
-        };
-        match self.op(code, n) {
-            Op::If { cond, .. } | Op::Select { cond, .. } => operand(cond),
-            Op::For { iter, .. } => operand(iter),
-            Op::Map { f, over, .. } | Op::Fold { f, over, .. } => {
-                [f, over].into_iter().for_each(operand)
-            }
-            Op::Mem { f, .. } => operand(f),
-            Op::Draw { keys, .. } => keys.iter().for_each(operand),
-            // The elements of arrays are not nodes; those of containers are.
-            Op::Index { keys, .. } if node.side.is_some() => keys.iter().for_each(operand),
-            Op::Call { callee: Callee::Value(v), .. } => operand(v),
-            _ => {}
-        }
-        match node.side.as_deref() {
-            Some(Side::MemoCall(c)) => c.deps.iter().for_each(|d| f(*d)),
-            Some(Side::Table(t)) => t.deps.iter().for_each(|d| f(*d)),
-            Some(Side::Loop(l)) => l.deps.iter().for_each(|d| f(*d)),
-            _ => {}
-        }
     }
 }

@@ -139,7 +139,7 @@ impl Trace {
                     .into_iter()
                     .map(|n| {
                         let (mut prior, mut likelihood) = Default::default();
-                        self.graph.put_scored(&self.code, n, &mut prior, &mut likelihood);
+                        self.graph.put_scored(n, &mut prior, &mut likelihood);
                         (n, [prior.value(), likelihood.value()])
                     })
                     .collect();
@@ -147,7 +147,7 @@ impl Trace {
             }
         }
         let (first, table) = (record.first, &mut *record.table);
-        self.graph.record_scores(&self.code, targets, before, record.given, |r: &mut Recorder| {
+        self.record_scores(targets, before, record.given, |r: &mut Recorder| {
             if first {
                 for n in base {
                     r.score(n)?;

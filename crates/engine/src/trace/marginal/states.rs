@@ -28,7 +28,7 @@ pub(super) struct Sites {
     colours: Vec<usize>,
     /// By factor: the choices that it depends on, in ascending order.
     pub scopes: BTreeMap<NodeId, Vec<usize>>,
-    /// Whether what is read is known to be the same in all states.
+    /// True if what is read is known to be the same in all states.
     same: bool,
 }
 
@@ -45,7 +45,7 @@ pub(super) enum Halt {
 
 /// A state that is being visited.
 pub(super) struct Visited<'a> {
-    /// Whether it is the first one.
+    /// True if it is the first one.
     pub first: bool,
     /// The index of each choice's value.
     pub indices: &'a [usize],
@@ -114,7 +114,7 @@ impl Trace {
                 let mut partition = Partition::default();
                 partition.grow(sites.targets.len());
                 let choices: Vec<NodeId> = self.all_targets().iter().map(|t| t.node).collect();
-                let mut reader = Reader::new(&self.graph, &self.code, &sites.own, &mut partition);
+                let mut reader = Reader::new(&self.graph, &sites.own, &mut partition);
                 reader.sets = Some(Sets::singletons(sites.targets.len()));
                 reader.read_all(choices.iter().copied());
                 let found = &reader.found;
@@ -177,24 +177,20 @@ impl Trace {
         scopes: &BTreeMap<NodeId, Vec<usize>>,
         choices: &[NodeId],
     ) -> Vec<(Option<NodeId>, NodeId)> {
-        let is_score = |n: &NodeId| {
-            self.graph.nodes[*n as usize].state == State::Clean
-                && matches!(self.graph.op(&self.code, *n), Op::Observe { .. } | Op::Factor { .. })
-        };
-        let mut all: Vec<NodeId> = (0..self.graph.nodes.len() as NodeId).filter(is_score).collect();
+        let is_score =
+            |n: &NodeId| matches!(self.graph.op(*n), Op::Observe { .. } | Op::Factor { .. });
+        let mut all: Vec<NodeId> = self.graph.clean().filter(is_score).collect();
         all.extend(choices);
         all.sort_unstable();
         all.dedup();
         let factor = |n: NodeId| {
-            if matches!(self.graph.op(&self.code, n), Op::Draw { .. }) {
+            if matches!(self.graph.op(n), Op::Draw { .. }) {
                 return scopes.contains_key(&n).then_some(n);
             }
-            let (mut at, mut outermost) = (n, None);
-            while at != NONE {
-                outermost = Some(at).filter(|at| scopes.contains_key(at)).or(outermost);
-                at = self.graph.frames[self.graph.nodes[at as usize].frame as usize].owner;
-            }
-            outermost
+            std::iter::once(n)
+                .chain(self.graph.owners(n))
+                .filter(|at| scopes.contains_key(at))
+                .last()
         };
         all.into_iter().map(|n| (factor(n), n)).collect()
     }

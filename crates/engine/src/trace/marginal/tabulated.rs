@@ -24,7 +24,7 @@ const MOST_WORK: usize = 1 << 24;
 pub struct Tabulated {
     /// The hashes of the addresses of the choices, and the values of each.
     choices: Vec<(u64, Vec<Datum>)>,
-    /// What depends on the choices, which are numbered from 0.
+    /// The scores that depend on the choices, which are numbered from 0.
     pub factors: Vec<Factor>,
     /// The log density of what depends on none of them.
     pub rest: f64,
@@ -94,7 +94,7 @@ impl Trace {
                 trace.asks_for_all(sites, &state)?;
                 tables.enter(trace, sites, state, power)
             };
-            let most = (MOST_WORK / self.graph.nodes.len().max(1)).clamp(1, MOST);
+            let most = (MOST_WORK / self.graph.store.len().max(1)).clamp(1, MOST);
             match self.visit_states(&mut sites, (most, false), draws, visit) {
                 Ok(()) => break self.tabulated(&sites, tables),
                 Err(Halt::Fails) => break Tabulation::Fails,
@@ -245,7 +245,7 @@ impl Tables {
                 Some(f) if open[*f].is_some() => &mut sums[*f],
                 _ => continue,
             };
-            trace.graph.put_scored(&trace.code, *n, prior, likelihood);
+            trace.graph.put_scored(*n, prior, likelihood);
         }
         let tempered = |[prior, likelihood]: &[ExactSum; 2]| {
             let likelihood = likelihood.value();

@@ -17,6 +17,7 @@ use crate::trace::graph::Graph;
 use crate::trace::node::*;
 use crate::trace::propose::Weight;
 use crate::trace::shortcuts::register::{Register, element, family};
+use crate::trace::store::Store;
 use crate::trace::{Target, Trace};
 use pcadlang_numerics::dist::{Datum, Dist};
 use pcadlang_numerics::num::ExactSum;
@@ -42,13 +43,13 @@ const LARGEST: usize = 1024;
 
 /// The evaluation of a local density on the nodes of one frame.
 pub(crate) struct Evaluation<'a, const N: usize> {
-    graph: &'a Graph,
+    graph: &'a Store,
     code: &'a Code,
     base: NodeId,
     registers: [Register<'a>; N],
     /// The values that are neither numbers nor part of the trace.
     made: SmallVec<[Value; 4]>,
-    /// Whether a selection takes its other alternative.
+    /// True if a selection takes its other alternative.
     turned: bool,
     prior: ExactSum,
     likelihood: ExactSum,
@@ -85,23 +86,6 @@ impl Trace {
 }
 
 impl Graph {
-    /// Whether a choice is a single number or boolean, stored as the program sees it.
-    pub fn is_plain_choice(&self, n: NodeId) -> bool {
-        let node = &self.nodes[n as usize];
-        let whole = match node.side.as_deref() {
-            None => true,
-            Some(Side::Choice(c)) => c.stored.is_none() && c.elements == NONE && c.deps.is_empty(),
-            _ => false,
-        };
-        whole && matches!(node.value, Value::Num(_) | Value::Bool(_))
-    }
-
-    /// Whether nodes of other frames read this one.
-    fn is_read_outside(&self, n: NodeId) -> bool {
-        let users = &self.outside[self.nodes[n as usize].outside as usize];
-        users.users.len() > users.gone as usize
-    }
-
     /// Returns the local densities that together give the effect of another value of a
     /// choice; `None` if there are none in this state.
     pub fn local_densities<'c>(
@@ -109,8 +93,8 @@ impl Graph {
         code: &'c Code,
         target: NodeId,
     ) -> Option<LocalDensities<'c>> {
-        let facts = self.slot_facts(code, target);
-        let finite = self.prior.is_fine() && self.likelihood.is_fine();
+        let facts = &code.slots[self.store[target].op];
+        let finite = self.score.prior.is_fine() && self.score.likelihood.is_fine();
         if !self.incremental
             || !finite
             || self.execution_log.is_some()
@@ -121,26 +105,26 @@ impl Graph {
         let mut all = LocalDensities::new();
         let own = facts.local_density.as_deref()?;
         self.add_local_density(target - facts.slot, own, &mut all)?;
-        let readers = &self.outside[self.nodes[target as usize].outside as usize].users;
+        let readers = &self.outside(target).users;
         if readers.len() > READERS {
             return None;
         }
         for (i, m) in readers.iter().enumerate() {
-            let node = &self.nodes[*m as usize];
+            let node = &self.store[*m];
             if node.state != State::Clean || readers[..i].contains(m) {
                 continue;
             }
             // An element of a container: its value is that of the choice.
-            let Op::Index { .. } = self.op(code, *m) else { return None };
+            let Op::Index { .. } = self.op(*m) else { return None };
             let Some(Side::Deps(deps)) = node.side.as_deref() else { return None };
             if deps.as_slice() != [target] {
                 return None;
             }
-            let facts = self.slot_facts(code, *m);
+            let facts = &code.slots[node.op];
             if self.is_read_outside(*m) {
                 return None;
             }
-            self.add_local_density(m - facts.slot, facts.local_density.as_deref()?, &mut all)?;
+            self.add_local_density(*m - facts.slot, facts.local_density.as_deref()?, &mut all)?;
         }
         Some(all)
     }
@@ -152,7 +136,7 @@ impl Graph {
         local_density: &'c LocalDensity,
         all: &mut LocalDensities<'c>,
     ) -> Option<()> {
-        if local_density.computations.iter().any(|slot| self.is_read_outside(base + slot)) {
+        if local_density.computations.iter().any(|slot| self.is_read_outside(base + *slot)) {
             return None;
         }
         // Two local densities in one frame could change the same score.
@@ -169,21 +153,34 @@ impl Graph {
     pub fn evaluation<'a>(&'a self, code: &'a Code) -> Evaluation<'a, REGISTERS> {
         Evaluation::new(self, code, [Register::Num(0.0); REGISTERS])
     }
+}
+
+impl Store {
+    /// True if a choice is a single number or boolean, stored as the program sees it.
+    pub fn is_plain_choice(&self, n: NodeId) -> bool {
+        let node = &self[n];
+        let whole = match node.side.as_deref() {
+            None => true,
+            Some(Side::Choice(c)) => c.stored.is_none() && c.elements == NONE && c.deps.is_empty(),
+            _ => false,
+        };
+        whole && matches!(node.value, Value::Num(_) | Value::Bool(_))
+    }
 
     /// Returns the distribution of a choice whose parameters are single numbers or
     /// evaluated arrays.
-    pub fn simple_dist(&self, code: &Code, n: NodeId) -> Option<Dist> {
-        let Op::Draw { dist: DistSpec::Family { builtin, args }, .. } = self.op(code, n) else {
+    pub fn simple_dist(&self, n: NodeId) -> Option<Dist> {
+        let Op::Draw { dist: DistSpec::Family { builtin, args }, .. } = self.op(n) else {
             return None;
         };
         let mut read = [Register::Num(0.0); PARAMETERS];
         let read = read.get_mut(..args.len())?;
-        let mut e = Evaluation::new(self, code, []);
-        e.base = n - self.slot_facts(code, n).slot;
+        let mut e = Evaluation::new(self, &self.code, []);
+        e.base = n - self.slot_facts(n).slot;
         for (to, o) in read.iter_mut().zip(args) {
             *to = e.read(Input::Operand(*o))?;
         }
-        family(code.builtins.get(*builtin), read)
+        family(self.code.builtins.get(*builtin), read)
     }
 }
 
@@ -199,7 +196,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
         power: f64,
     ) -> Option<f64> {
         self.begin(Register::of_datum(value)?);
-        self.prior.sub(self.graph.nodes[target as usize].score);
+        self.prior.sub(self.graph[target].score);
         self.prior.add(dist.log_density_stored(value));
         local_densities
             .iter()
@@ -296,7 +293,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
                 }
                 Instruction::Observe { slot, builtin, ref parameters, value } => {
                     let n = self.base + slot;
-                    let replaced = self.graph.replaced(self.code, n).map(Register::of);
+                    let replaced = self.graph.replaced(n).map(Register::of);
                     let observed = replaced.map_or_else(|| self.read(value), Some)?;
                     match self.log_density(builtin, parameters, observed) {
                         Some(score) => {
@@ -334,7 +331,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
             return None;
         }
         let values = self.values(operands)?;
-        let value = match self.graph.op(self.code, self.base + slot) {
+        let value = match self.graph.op(self.base + slot) {
             Op::Prim { builtin, .. } => {
                 let values: SmallVec<[&Value; 4]> = values.iter().collect();
                 self.code.builtins.get(*builtin).apply(&values).ok()?
@@ -374,14 +371,14 @@ impl<'a> Evaluation<'a, REGISTERS> {
     /// Scores an observation of any kind, as an update would.
     fn observe(&mut self, slot: Slot, parameters: &[Input], observed: Input) -> Option<()> {
         let n = self.base + slot;
-        let Op::Observe { dist, .. } = self.graph.op(self.code, n) else { return None };
+        let Op::Observe { dist, .. } = self.graph.op(n) else { return None };
         let values = self.values(parameters)?;
         let values: SmallVec<[&Value; 4]> = values.iter().collect();
-        let observed = match self.graph.replaced(self.code, n) {
+        let observed = match self.graph.replaced(n) {
             Some(value) => value.clone(),
             None => self.value(observed)?,
         };
-        let score = self.graph.score_of_values(self.code, n, dist, &values, &observed).ok()?;
+        let score = self.graph.score_of_values(n, dist, &values, &observed).ok()?;
         self.graph.take_score(n, &mut self.likelihood);
         match score {
             Score::One(score) => self.likelihood.add(score),
@@ -390,7 +387,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
         Some(())
     }
 
-    /// Whether its selections can take their other alternatives without releasing
+    /// True if its selections can take their other alternatives without releasing
     /// anything except computations.
     fn can_choose(&self, local_density: &LocalDensity) -> bool {
         let is_taken = |h: &KeptAlternative| {
@@ -399,7 +396,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
         };
         let is_kept = |h: &KeptAlternative| {
             let Some(n) = self.graph.resolve(self.frame(), h.operand) else { return true };
-            let node = &self.graph.nodes[n as usize];
+            let node = &self.graph[n];
             if node.refs > h.times || !is_taken(h) {
                 return true;
             }
@@ -408,8 +405,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
                 .iter()
                 .filter(|other| other.operand == h.operand && is_taken(other))
                 .count();
-            let holds_nothing =
-                matches!(self.graph.op(self.code, n), Op::Item) && node.side.is_none();
+            let holds_nothing = matches!(self.graph.op(n), Op::Item) && node.side.is_none();
             node.refs as usize > now || holds_nothing
         };
         local_density.computed.iter().all(|slot| self.node(*slot).side.is_none())
@@ -462,11 +458,11 @@ impl<'a> Evaluation<'a, REGISTERS> {
 }
 
 impl<'a, const N: usize> Evaluation<'a, N> {
-    fn new(graph: &'a Graph, code: &'a Code, registers: [Register<'a>; N]) -> Self {
+    fn new(graph: &'a Store, code: &'a Code, registers: [Register<'a>; N]) -> Self {
         Evaluation {
             graph,
             code,
-            base: 0,
+            base: NodeId::default(),
             registers,
             made: SmallVec::new(),
             turned: false,
@@ -477,11 +473,11 @@ impl<'a, const N: usize> Evaluation<'a, N> {
 
     #[inline(always)]
     fn node(&self, slot: Slot) -> &'a Node {
-        &self.graph.nodes[(self.base + slot) as usize]
+        &self.graph[self.base + slot]
     }
 
     fn frame(&self) -> FrameId {
-        self.graph.nodes[self.base as usize].frame
+        self.graph[self.base].frame
     }
 
     #[inline(always)]
@@ -492,7 +488,7 @@ impl<'a, const N: usize> Evaluation<'a, N> {
                 return Some(Register::of(self.code.const_value(i)));
             }
             Input::Operand(Operand::Local(slot)) => self.node(slot),
-            Input::Operand(o) => &self.graph.nodes[self.graph.resolve(self.frame(), o)? as usize],
+            Input::Operand(o) => &self.graph[self.graph.resolve(self.frame(), o)?],
         };
         (node.state == State::Clean).then(|| Register::of(&node.value))
     }

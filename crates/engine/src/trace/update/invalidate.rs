@@ -6,61 +6,80 @@
 //! ([`super::propagate`]) re-runs stale nodes on demand and stops where values come out
 //! equal.
 
-use crate::lang::code::{Callee, Code, DistSpec, Op, Operand};
-use crate::lang::value::Value;
-use crate::trace::graph::Graph;
+use super::Update;
+use crate::lang::code::{Callee, Code, Op, Operand};
+use crate::trace::choices::Target;
 use crate::trace::node::*;
+use crate::trace::propose::{Change, Pending};
+use crate::trace::store::Store;
 
-impl Graph {
-    /// Invalidates a choice or observation that is about to change, and everything that
-    /// reads it.
-    pub fn invalidate_target(&mut self, code: &Code, n: NodeId) {
-        self.make_stale(code, n);
-        self.invalidate_users(code, n);
-        self.invalidate_pending(code);
-    }
-
-    /// Invalidates every evaluated node (full re-execution).
-    pub fn invalidate_everything(&mut self, code: &Code) {
-        for n in 0..self.nodes.len() as NodeId {
-            if self.nodes[n as usize].state == State::Clean {
-                self.make_stale(code, n);
+impl Update {
+    /// Queues changes and invalidates what depends on them.
+    pub fn queue(&mut self, store: &mut Store, code: &Code, changes: &[(Target, Change)]) {
+        self.pending.extend(changes.iter().map(|(t, c)| Pending {
+            node: t.node,
+            element: t.element,
+            change: c.clone(),
+        }));
+        self.pending.sort_by_key(|p| p.node);
+        if !store.incremental {
+            self.invalidate_everything(store);
+        }
+        for (t, _) in changes {
+            self.save(store, t.node);
+            if store[t.node].flags & TARGET == 0 {
+                store[t.node].flags |= TARGET;
+                self.invalidate_target(store, code, t.node);
             }
         }
     }
 
-    fn invalidate_each_outside(&mut self, code: &Code, n: NodeId) {
-        let list = self.nodes[n as usize].outside as usize;
-        for i in 0..self.outside[list].users.len() {
-            let user = self.outside[list].users[i];
-            self.invalidate(code, user);
+    /// Invalidates a choice or observation that is about to change, and everything that
+    /// reads it.
+    pub fn invalidate_target(&mut self, store: &mut Store, code: &Code, n: NodeId) {
+        self.make_stale(store, n);
+        self.invalidate_users(store, code, n);
+        self.invalidate_pending(store, code);
+    }
+
+    /// Invalidates every evaluated node (full re-execution).
+    pub fn invalidate_everything(&mut self, store: &mut Store) {
+        for n in store.clean().collect::<Vec<_>>() {
+            self.make_stale(store, n);
+        }
+    }
+
+    fn invalidate_each_outside(&mut self, store: &mut Store, code: &Code, n: NodeId) {
+        for i in 0..store.outside(n).users.len() {
+            let user = store.outside(n).users[i];
+            self.invalidate(store, code, user);
         }
     }
 
     /// Invalidates the users of all nodes on the stack.
-    fn invalidate_pending(&mut self, code: &Code) {
+    fn invalidate_pending(&mut self, store: &mut Store, code: &Code) {
         while let Some(n) = self.stack.pop() {
-            self.invalidate_users(code, n);
+            self.invalidate_users(store, code, n);
         }
     }
 
     /// Invalidates the users of a node; those that may propagate a change go onto the
     /// stack.
-    fn invalidate_users(&mut self, code: &Code, n: NodeId) {
-        let facts = self.slot_facts(code, n);
+    fn invalidate_users(&mut self, store: &mut Store, code: &Code, n: NodeId) {
+        let facts = &code.slots[store[n].op];
         for user in &facts.users {
-            self.invalidate_static_user(code, n, n - facts.slot + user);
+            self.invalidate_static_user(store, code, n, n - facts.slot + *user);
         }
-        self.invalidate_each_outside(code, n);
+        self.invalidate_each_outside(store, code, n);
         if !facts.is_result {
             return;
         }
-        let frame = self.nodes[n as usize].frame;
-        let owner = self.frames[frame as usize].owner;
-        if owner != NONE {
-            match self.op(code, owner) {
-                Op::Call { .. } | Op::If { .. } => self.invalidate(code, owner),
-                Op::Fold { .. } => self.invalidate_next_pass(code, owner, frame),
+        let frame = store[n].frame;
+        let owner = store[frame].owner;
+        if owner != NodeId::NONE {
+            match store.op(owner) {
+                Op::Call { .. } | Op::If { .. } => self.invalidate(store, code, owner),
+                Op::Fold { .. } => self.invalidate_next_pass(store, code, owner, frame),
                 _ => {}
             }
         }
@@ -68,128 +87,117 @@ impl Graph {
 
     /// Invalidates a user in the same frame. The change of an argument goes to the
     /// parameter it feeds, past the call itself.
-    fn invalidate_static_user(&mut self, code: &Code, n: NodeId, user: NodeId) {
-        let (callee, args) = match self.op(code, user) {
+    fn invalidate_static_user(&mut self, store: &mut Store, code: &Code, n: NodeId, user: NodeId) {
+        let (callee, args) = match &code.ops[store[user].op] {
             Op::Call { callee, args, .. } => (callee, args),
             Op::Select { cond, then, otherwise } => {
-                let node = &self.nodes[user as usize];
+                let node = &store[user];
                 let taken = if node.flags & OTHERWISE == 0 { then } else { otherwise };
-                if [cond, taken].iter().any(|o| self.resolve(node.frame, **o) == Some(n)) {
-                    self.invalidate(code, user);
+                if [cond, taken].iter().any(|o| store.resolve(node.frame, **o) == Some(n)) {
+                    self.invalidate(store, code, user);
                 }
                 return;
             }
-            _ => return self.invalidate(code, user),
+            _ => return self.invalidate(store, code, user),
         };
-        let Some(Side::Child(child)) = self.nodes[user as usize].side.as_deref() else {
-            return self.invalidate(code, user);
+        let Some(Side::Child(child)) = store[user].side.as_deref() else {
+            return self.invalidate(store, code, user);
         };
         let child = *child;
-        let frame = self.nodes[user as usize].frame;
+        let frame = store[user].frame;
         if let Callee::Value(v) = callee
-            && self.resolve(frame, *v) == Some(n)
+            && store.resolve(frame, *v) == Some(n)
         {
-            self.invalidate(code, user);
+            self.invalidate(store, code, user);
         }
-        let base = self.frames[child.frame as usize].base;
+        let base = store[child.frame].base;
         for (i, (_, a)) in args.iter().enumerate() {
-            if !matches!(a, Operand::Local(_)) || self.resolve(frame, *a) != Some(n) {
+            if !matches!(a, Operand::Local(_)) || store.resolve(frame, *a) != Some(n) {
                 continue;
             }
-            let param = match &self.frames[child.frame as usize].args {
+            let param = match &store[child.frame].args {
                 Arguments::Positional(_) => Some(i),
                 Arguments::Mapped(map) => map.iter().position(|m| *m == Some(i as u16)),
                 _ => None,
             };
             if let Some(p) = param {
-                self.invalidate(code, base + p as u32);
+                self.invalidate(store, code, base + Slot::new(p));
             }
         }
     }
 
     /// Invalidates the reader of the result of a pass of a `fold`: the next pass, or the
     /// fold itself.
-    fn invalidate_next_pass(&mut self, code: &Code, owner: NodeId, frame: FrameId) {
-        let pass = self.frames[frame as usize].pass as usize;
-        let Some(Side::Loop(l)) = self.nodes[owner as usize].side.as_deref() else { return };
+    fn invalidate_next_pass(
+        &mut self,
+        store: &mut Store,
+        code: &Code,
+        owner: NodeId,
+        frame: FrameId,
+    ) {
+        let pass = store[frame].pass as usize;
+        let Some(Side::Loop(l)) = store[owner].side.as_deref() else { return };
         match l.frames.get(pass + 1) {
-            Some(next) if *next != NONE => {
-                let accumulator = self.frames[*next as usize].base;
-                self.invalidate(code, accumulator);
+            Some(next) if *next != FrameId::NONE => {
+                let accumulator = store[*next].base;
+                self.invalidate(store, code, accumulator);
             }
-            _ => self.invalidate(code, owner),
+            _ => self.invalidate(store, code, owner),
         }
     }
 
     /// Invalidates one node, if it is evaluated and not yet stale.
-    fn invalidate(&mut self, code: &Code, n: NodeId) {
-        let state = self.nodes[n as usize].state;
+    fn invalidate(&mut self, store: &mut Store, code: &Code, n: NodeId) {
+        let state = store[n].state;
         if state != State::Clean {
             // The choice became stale before its key did.
             if matches!(state, State::Stale)
-                && matches!(self.op(code, n), Op::Draw { keys, .. } if !keys.is_empty())
-                && self.may_be_redrawn(code, n)
+                && matches!(store.op(n), Op::Draw { keys, .. } if !keys.is_empty())
+                && store.may_be_redrawn(n)
             {
                 self.stack.push(n);
             }
             return;
         }
-        self.make_stale(code, n);
-        match self.op(code, n) {
+        self.make_stale(store, n);
+        match store.op(n) {
             Op::Draw { .. } => {
-                if self.may_be_redrawn(code, n) {
+                if store.may_be_redrawn(n) {
                     self.stack.push(n);
                 }
             }
             Op::Observe { .. } | Op::Factor { .. } => {}
             Op::For { .. } | Op::Map { .. } | Op::Fold { .. } => {
-                self.invalidate_items(code, n);
+                self.invalidate_items(store, code, n);
                 self.stack.push(n);
             }
             _ => self.stack.push(n),
         }
     }
 
-    /// Whether a stale choice may get another value without being a target: a whitened
-    /// one moves with its distribution, and one whose key, length or kind changes is
-    /// resampled.
-    pub fn may_be_redrawn(&self, code: &Code, n: NodeId) -> bool {
-        let node = &self.nodes[n as usize];
-        let Op::Draw { dist, keys, .. } = self.op(code, n) else { return false };
-        let stale = |o: &Operand| {
-            self.resolve(node.frame, *o)
-                .is_some_and(|k| matches!(self.nodes[k as usize].state, State::Stale))
-        };
-        let whole = matches!(node.side.as_deref(), Some(Side::Choice(c)) if c.stored.is_some() || c.elements != NONE);
-        whole
-            || matches!(dist, DistSpec::Value(_))
-            || !matches!(node.value, Value::Num(_) | Value::Bool(_))
-            || keys.iter().any(stale)
-    }
-
     /// Invalidates the elements of a loop's passes: what the loop runs over may have
     /// changed.
-    fn invalidate_items(&mut self, code: &Code, n: NodeId) {
-        let Some(Side::Loop(l)) = self.nodes[n as usize].side.as_deref() else { return };
-        let item = u32::from(matches!(self.op(code, n), Op::Fold { .. }));
+    fn invalidate_items(&mut self, store: &mut Store, code: &Code, n: NodeId) {
+        let Some(Side::Loop(l)) = store[n].side.as_deref() else { return };
+        let item = usize::from(matches!(store.op(n), Op::Fold { .. }));
         let passes = l.frames.len();
         for i in 0..passes {
-            let Some(Side::Loop(l)) = self.nodes[n as usize].side.as_deref() else { return };
+            let Some(Side::Loop(l)) = store[n].side.as_deref() else { return };
             let f = l.frames[i];
-            if f != NONE {
-                let base = self.frames[f as usize].base;
-                self.invalidate(code, base + item);
+            if f != FrameId::NONE {
+                let base = store[f].base;
+                self.invalidate(store, code, base + Slot::new(item));
                 if item == 1 && i == 0 {
-                    self.invalidate(code, base);
+                    self.invalidate(store, code, base);
                 }
             }
         }
     }
 
-    pub fn make_stale(&mut self, code: &Code, n: NodeId) {
-        self.save(n);
-        self.nodes[n as usize].state = State::Stale;
-        let facts = self.slot_facts(code, n);
+    pub fn make_stale(&mut self, store: &mut Store, n: NodeId) {
+        self.save(store, n);
+        store[n].state = State::Stale;
+        let facts = store.slot_facts(n);
         if facts.is_effect {
             self.stale_effects.push(n);
         } else if facts.is_draw {

@@ -6,7 +6,7 @@
 //! changed.
 
 use crate::lang::builtins::PreviousEvaluation;
-use crate::lang::code::{Code, Op};
+use crate::lang::code::{Code, Op, Operand};
 use crate::lang::error::{FaultKind, RunError};
 use crate::lang::value::Value;
 use crate::trace::graph::Graph;
@@ -24,6 +24,9 @@ pub(crate) enum Poll {
     Pending,
 }
 
+/// One attempt to evaluate a node.
+pub(crate) type Step = Result<Poll, Failure>;
+
 /// A failure with its location.
 pub(crate) type Failure = Box<RunError>;
 
@@ -35,60 +38,61 @@ impl Graph {
             self.run_effects(code)?;
             // A stale choice may acquire what another node released, so stale choices run
             // before the sweep, except those that are to be swept themselves.
-            if self.unheld.is_empty() && self.idle.is_empty() {
-                let Some(n) = self.stale_choices.pop() else { break };
-                if self.nodes[n as usize].state == State::Stale {
+            if self.update.unheld.is_empty() && self.update.idle.is_empty() {
+                let Some(n) = self.update.stale_choices.pop() else { break };
+                if self.store[n].state == State::Stale {
                     self.run_in_place(code, n)?;
                 }
                 continue;
             }
             let unreachable =
-                if self.stale_choices.is_empty() { Vec::new() } else { self.unreachable(code) };
+                if self.update.stale_choices.is_empty() { Vec::new() } else { self.unreachable() };
             let stays = |n: &NodeId| {
-                self.nodes[*n as usize].state == State::Stale
-                    && unreachable.binary_search(n).is_err()
+                self.store[*n].state == State::Stale && unreachable.binary_search(n).is_err()
             };
-            let next = self.stale_choices.iter().rposition(stays).filter(|_| self.idle.is_empty());
+            let next = self
+                .update
+                .stale_choices
+                .iter()
+                .rposition(stays)
+                .filter(|_| self.update.idle.is_empty());
             match next {
                 Some(i) => {
-                    let n = self.stale_choices.swap_remove(i);
+                    let n = self.update.stale_choices.swap_remove(i);
                     self.run_in_place(code, n)?;
                 }
-                None => self.sweep(code),
+                None => self.sweep(),
             }
         }
-        self.sweep(code);
-        self.update_selections(code)
+        self.sweep();
+        self.choices.update_selections(&self.store, &mut self.update)
     }
 
     /// Returns the nodes that a sweep would empty now, if nothing released is acquired
     /// again; sorted.
-    fn unreachable(&self, code: &Code) -> Vec<NodeId> {
-        let mut open = self.unheld.clone();
-        open.retain(|n| self.nodes[*n as usize].refs == 0);
+    fn unreachable(&self) -> Vec<NodeId> {
+        let mut open = self.update.unheld.clone();
+        open.retain(|n| self.store[*n].refs == 0);
         let (mut unreachable, mut left) = (Vec::new(), FxHashMap::<NodeId, u32>::default());
         while let Some(n) = open.pop() {
-            let node = &self.nodes[n as usize];
+            let node = &self.store[n];
             if node.state == State::Empty {
                 continue;
             }
             unreachable.push(n);
             let mut release = |d: NodeId| {
-                let refs = left.entry(d).or_insert(self.nodes[d as usize].refs);
+                let refs = left.entry(d).or_insert(self.store[d].refs);
                 *refs = refs.saturating_sub(1);
                 if *refs == 0 {
                     open.push(d);
                 }
             };
             if node.flags & HELD != 0 {
-                self.each_dep(code, n, |d, _| release(d));
+                self.each_dep(n, |d, _| release(d));
             }
             if let Some(Side::Child(c)) = node.side.as_deref() {
-                let frame = &self.frames[c.frame as usize];
-                code.blocks[frame.block as usize]
-                    .effects
-                    .iter()
-                    .for_each(|s| release(frame.base + s));
+                let frame = &self.store[c.frame];
+                self.code.blocks[frame.block].effects.iter().for_each(|s| release(frame.base + *s));
             }
         }
         unreachable.sort_unstable();
@@ -96,46 +100,40 @@ impl Graph {
     }
 
     fn run_effects(&mut self, code: &Code) -> Result<(), Failure> {
-        let mut stale = std::mem::take(&mut self.stale_effects);
+        let mut stale = std::mem::take(&mut self.update.stale_effects);
         let mut result = Ok(());
         for n in stale.drain(..) {
-            if self.nodes[n as usize].state == State::Stale {
+            if self.store[n].state == State::Stale {
                 result = self.run_in_place(code, n);
                 if result.is_err() {
                     break;
                 }
             }
         }
-        self.stale_effects = stale;
+        self.update.stale_effects = stale;
         result?;
         let mut next = 0;
-        while next < self.effects.len() {
-            let n = self.effects[next];
+        while next < self.update.effects.len() {
+            let n = self.update.effects[next];
             next += 1;
-            if self.nodes[n as usize].state == State::Empty && self.nodes[n as usize].refs > 0 {
+            if self.store[n].state == State::Empty && self.store[n].refs > 0 {
                 self.run_in_place(code, n)?;
             }
         }
-        self.effects.clear();
+        self.update.effects.clear();
         Ok(())
     }
 
     /// Runs an effect or choice, unless an owner of an enclosing frame detaches that
     /// frame: outer owners decide whether inner ones still exist.
     fn run_in_place(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
-        let mut owners: SmallVec<[NodeId; 8]> = SmallVec::new();
-        let mut f = self.nodes[n as usize].frame;
-        while self.frames[f as usize].owner != NONE {
-            let owner = self.frames[f as usize].owner;
-            owners.push(owner);
-            f = self.nodes[owner as usize].frame;
-        }
+        let mut owners: SmallVec<[NodeId; 8]> = self.owners(n).collect();
         while let Some(owner) = owners.pop() {
-            if self.nodes[owner as usize].state == State::Stale {
+            if self.store[owner].state == State::Stale {
                 self.evaluate(code, owner)?;
             }
             let below = owners.last().copied().unwrap_or(n);
-            if !self.frames[self.nodes[below as usize].frame as usize].attached {
+            if !self.store[self.store[below].frame].attached {
                 return Ok(());
             }
         }
@@ -144,83 +142,81 @@ impl Graph {
 
     /// Brings a node up to date.
     pub fn evaluate(&mut self, code: &Code, root: NodeId) -> Result<(), Failure> {
-        let bottom = self.stack.len();
-        self.stack.push(root);
+        let bottom = self.update.stack.len();
+        self.update.stack.push(root);
         self.run_stack(code, bottom)
     }
 
     /// Evaluates the nodes on the stack until it is down to height `bottom`.
     pub fn run_stack(&mut self, code: &Code, bottom: usize) -> Result<(), Failure> {
-        while self.stack.len() > bottom {
-            let n = self.stack[self.stack.len() - 1];
-            match self.nodes[n as usize].state {
+        while self.update.stack.len() > bottom {
+            let n = self.update.stack[self.update.stack.len() - 1];
+            match self.store[n].state {
                 State::Clean => {
-                    self.stack.pop();
+                    self.update.stack.pop();
                     continue;
                 }
                 State::Running => {}
                 state => {
-                    self.save(n);
-                    let node = &mut self.nodes[n as usize];
+                    self.update.save(&mut self.store, n);
+                    let node = &mut self.store[n];
                     node.state = State::Running;
                     if state == State::Stale {
                         node.flags |= WAS_STALE;
                     }
                 }
             }
-            match self.count_operation(code, n).and_then(|()| self.step(code, n)) {
-                Ok(Poll::Ready) => {}
-                Ok(Poll::Pending) => {}
-                Err(e) => {
-                    self.failed.clear();
-                    self.failed.extend(self.stack.drain(bottom..));
-                    return Err(e);
-                }
+            let step =
+                self.budget.count_operation(&self.store, n).and_then(|()| self.step(code, n));
+            if let Err(e) = step {
+                self.update.failed.clear();
+                self.update.failed.extend(self.update.stack.drain(bottom..));
+                return Err(e);
             }
         }
         Ok(())
     }
 
     /// Pushes a node that is needed onto the stack.
-    pub fn need(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        if self.nodes[n as usize].state == State::Running {
-            let message = match self.name_of(code, n) {
+    pub fn need(&mut self, n: NodeId) -> Step {
+        if self.store[n].state == State::Running {
+            let message = match self.name_of(n) {
                 Some(name) => format!("`{name}` depends on its own value"),
                 None => "this value depends on itself".to_owned(),
             };
-            return Err(self.fail(code, n, FaultKind::Cycle, message, None));
+            return Err(self.fail(n, FaultKind::Cycle, message, None));
         }
-        self.stack.push(n);
+        self.update.stack.push(n);
         Ok(Poll::Pending)
     }
 
     /// Ends the evaluation of a node with a value.
-    pub fn finish(&mut self, code: &Code, n: NodeId, value: Value) -> Poll {
-        let epoch = self.epoch;
-        let node = &mut self.nodes[n as usize];
+    pub fn finish(&mut self, n: NodeId, value: Value) -> Poll {
+        let epoch = self.update.epoch;
+        let node = &mut self.store[n];
         if node.flags & WAS_STALE == 0 || !value.same(&node.value) {
             node.value = value;
             node.changed = epoch;
         }
-        self.finish_unchanged(code, n)
+        self.finish_unchanged(n)
     }
 
     /// Ends the evaluation of a node with a newly built value, which counts towards the
     /// limits.
-    pub fn finish_made(&mut self, code: &Code, n: NodeId, value: Value) -> Result<Poll, Failure> {
-        self.count_elements(code, n, &value)?;
-        Ok(self.finish(code, n, value))
+    pub fn finish_made(&mut self, n: NodeId, value: Value) -> Step {
+        self.budget.count_elements(&self.store, n, &value)?;
+        Ok(self.finish(n, value))
     }
 
     /// Ends the evaluation of a node whose value does not change.
-    pub fn finish_unchanged(&mut self, code: &Code, n: NodeId) -> Poll {
-        let node = &mut self.nodes[n as usize];
+    pub fn finish_unchanged(&mut self, n: NodeId) -> Poll {
+        let node = &mut self.store[n];
         node.state = State::Clean;
         node.flags &= !WAS_STALE;
         if node.flags & HELD == 0 {
             node.flags |= HELD;
             let mut deps: SmallVec<[(NodeId, bool); 8]> = SmallVec::new();
-            self.each_dep(code, n, |d, outside| deps.push((d, outside)));
+            self.each_dep(n, |d, outside| deps.push((d, outside)));
             for (d, outside) in deps {
                 self.acquire(d, n, outside);
             }
@@ -230,31 +226,21 @@ impl Graph {
 
     /// Replaces the nodes that a node holds besides its operands.
     pub fn set_deps(&mut self, n: NodeId, deps: Deps) {
-        if deps.is_empty() && self.nodes[n as usize].side.is_none() {
-            return;
+        match self.store[n].side.as_deref() {
+            None if deps.is_empty() => return,
+            Some(Side::Kept(_)) | None => {}
+            Some(side) if side.deps() == deps.as_slice() => return,
+            Some(_) => {}
         }
-        let held = self.nodes[n as usize].flags & HELD != 0;
-        let old = match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Deps(old) | Side::Kept(Kept { deps: old, .. })) => old.clone(),
-            Some(Side::Choice(c)) => c.deps.clone(),
-            Some(Side::Total(t)) => t.deps.clone(),
-            _ => Deps::new(),
-        };
-        if old == deps && !matches!(self.nodes[n as usize].side.as_deref(), Some(Side::Kept(_))) {
-            return;
-        }
-        if held {
-            deps.iter().for_each(|d| self.acquire(*d, n, true));
-            old.iter().for_each(|d| self.release(*d, true));
-        }
-        match self.nodes[n as usize].side.as_deref_mut() {
+        self.hold_instead(n, &deps);
+        match self.store[n].side.as_deref_mut() {
             Some(Side::Choice(c)) => {
-                self.journal.push(Entry::Choice(n, Box::new(c.clone())));
+                self.update.note(Entry::Choice(n, Box::new(c.clone())));
                 c.deps = deps;
             }
             Some(Side::Total(t)) => {
                 let old = std::mem::replace(&mut t.deps, deps);
-                self.note(Entry::TotalDeps(n, old));
+                self.update.note(Entry::TotalDeps(n, old));
             }
             _ => self.set_side(n, if deps.is_empty() { None } else { Some(Side::Deps(deps)) }),
         }
@@ -263,34 +249,31 @@ impl Graph {
     /// Stores the evaluation of an incremental function, and the nodes held besides the
     /// operands.
     pub fn keep(&mut self, n: NodeId, deps: Deps, before: PreviousEvaluation) {
-        let old = match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Deps(old) | Side::Kept(Kept { deps: old, .. })) => old.clone(),
-            _ => Deps::new(),
-        };
-        if self.nodes[n as usize].flags & HELD != 0 && old != deps {
-            deps.iter().for_each(|d| self.acquire(*d, n, true));
-            old.iter().for_each(|d| self.release(*d, true));
+        if self.store[n].side.as_deref().map_or(&[][..], Side::deps) != deps.as_slice() {
+            self.hold_instead(n, &deps);
         }
         self.set_side(n, Some(Side::Kept(Kept { deps, before: Arc::new(before) })));
     }
 
-    /// Returns the previous evaluation that an incremental function may start from.
-    pub fn kept(&self, n: NodeId) -> Option<&Arc<PreviousEvaluation>> {
-        match self.nodes[n as usize].side.as_deref() {
-            Some(Side::Kept(k)) if self.incremental => Some(&k.before),
-            _ => None,
+    /// Acquires what a node will hold besides its operands, and releases what it held.
+    fn hold_instead(&mut self, n: NodeId, deps: &[NodeId]) {
+        if self.store[n].flags & HELD != 0 {
+            let side = self.store[n].side.as_deref();
+            let old: Deps = side.map_or(&[][..], Side::deps).into();
+            deps.iter().for_each(|d| self.acquire(*d, n, true));
+            old.iter().for_each(|d| self.release(*d, true));
         }
     }
 
     /// Makes one attempt to evaluate a node.
-    fn step(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        if self.nodes[n as usize].flags & WAS_STALE != 0 && self.incremental {
+    fn step(&mut self, code: &Code, n: NodeId) -> Step {
+        if self.store[n].flags & WAS_STALE != 0 && self.incremental {
             let mut changed = false;
-            let mut wait = NONE;
-            let epoch = self.epoch;
-            self.each_dep(code, n, |d, _| {
-                let dep = &self.nodes[d as usize];
-                if !changed && wait == NONE {
+            let mut wait = NodeId::NONE;
+            let epoch = self.update.epoch;
+            self.each_dep(n, |d, _| {
+                let dep = &self.store[d];
+                if !changed && wait == NodeId::NONE {
                     if dep.state != State::Clean {
                         wait = d;
                     } else if dep.changed == epoch {
@@ -299,15 +282,15 @@ impl Graph {
                 }
             });
             if !changed {
-                if wait != NONE {
-                    return self.need(code, wait);
+                if wait != NodeId::NONE {
+                    return self.need(wait);
                 }
                 // Elements of passes also read their owner, and targets their pending
                 // change.
-                let op = self.op(code, n);
+                let op = self.op(n);
                 let reads_more = matches!(op, Op::Item | Op::Accumulator | Op::Param { .. });
-                if !reads_more && self.nodes[n as usize].flags & TARGET == 0 {
-                    return Ok(self.finish_unchanged(code, n));
+                if !reads_more && self.store[n].flags & TARGET == 0 {
+                    return Ok(self.finish_unchanged(n));
                 }
             }
         }
@@ -315,12 +298,41 @@ impl Graph {
     }
 
     /// Makes one attempt to run the operation of a node.
-    pub fn run(&mut self, code: &Code, n: NodeId) -> Result<Poll, Failure> {
-        let step = self.run_op(code, n)?;
+    pub fn run(&mut self, code: &Code, n: NodeId) -> Step {
+        let step = self.run_op(code, n).map_err(|mut e| {
+            // A choice outside of its support, such as a label beyond the number of groups,
+            // gives the state density zero, whatever it indexes. A choice is scored before
+            // anything that depends on it is evaluated.
+            if e.kind == FaultKind::Index && self.score.prior.value() == f64::NEG_INFINITY {
+                e.kind = FaultKind::Domain;
+            }
+            e
+        })?;
         if let (Poll::Ready, Some(log)) = (&step, &mut self.execution_log) {
-            let f = &self.frames[self.nodes[n as usize].frame as usize];
+            let f = &self.store[self.store[n].frame];
             log.push((f.block, n - f.base));
         }
         Ok(step)
+    }
+
+    /// Evaluates operands of a frame, with containers read as arrays or records.
+    pub fn query(
+        &mut self,
+        code: &Code,
+        frame: FrameId,
+        operands: &[Operand],
+    ) -> Result<Vec<Value>, Failure> {
+        let mut values = Vec::with_capacity(operands.len());
+        for o in operands {
+            if let Some(n) = self.resolve(frame, *o) {
+                self.evaluate(code, n)?;
+            }
+            if let Value::Container(r) = self.value(frame, *o) {
+                let gather = r.node.gather();
+                self.evaluate(code, gather)?;
+            }
+            values.push(self.plain(frame, *o, &mut Deps::new()).clone());
+        }
+        Ok(values)
     }
 }

@@ -196,7 +196,7 @@ impl Summed {
             let weights: Vec<f64> =
                 weights.map(|((first, c), v)| if first { libm::exp(c[*v]) } else { 0.0 }).collect();
             let base = f64::from(u8::from(k == 0));
-            let weight = |n: u32| trace.group_of(elimination, n).map_or(base, |i| weights[i]);
+            let weight = |n| trace.group_of(elimination, n).map_or(base, |i| weights[i]);
             part.clear();
             let force = trace.weighted_gradient(targets, at.power, &weight, &mut part);
             if recoverable(force)?.is_none() {

@@ -15,14 +15,15 @@ use std::sync::Arc;
 /// A row and its first byte.
 type Row = (usize, StringRecord);
 
-/// What spreadsheets, R, pandas and other programs write for a missing entry, in small letters.
+/// The spellings of a missing entry in spreadsheets, R, pandas and other programs, in small
+/// letters.
 const ABSENT: [&str; 12] =
     ["", "na", "n/a", "#n/a", "#na", "<na>", "null", "none", "nan", "-", ".", "?"];
 /// A column holds numbers if there are at least this many of them for each other text: the
 /// texts are then mistakes.
 const NUMBERS: usize = 3;
 
-/// What a field is on its own.
+/// The type of a field on its own.
 #[derive(Clone, Copy)]
 enum Field {
     Num(f64),

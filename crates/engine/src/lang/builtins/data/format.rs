@@ -104,7 +104,7 @@ impl Options {
         self.0.iter().map(|(name, value)| (&**name, value))
     }
 
-    /// Whether there are none.
+    /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

@@ -77,7 +77,7 @@ impl Table {
         Ok(options)
     }
 
-    /// Whether data of a kind have options.
+    /// True if data of a kind have options.
     pub fn has_options(&self, kind: &str) -> bool {
         self.kind(kind).is_some_and(has_options)
     }
