@@ -83,24 +83,23 @@ impl Contours {
     }
 
     /// The derivatives with respect to the pieces of a mesh's contours, given those with
-    /// respect to the pieces of the surface that it stands for: each moves, stretches and
-    /// turns with the nearest one that runs the same way.
+    /// respect to the pieces of the surface that it stands for: each takes those, per unit
+    /// of length, of the nearest one that runs the same way.
     fn handed_over(&self, to: &Contours, by_piece: &[[f64; 4]]) -> Vec<[f64; 4]> {
-        let mut out = vec![[0.0; 4]; to.len()];
-        for (i, by) in by_piece.iter().enumerate().take(self.len()) {
-            let apart = |k: &usize| {
-                let (dx, dy) = (self.x[i] - to.x[*k], self.y[i] - to.y[*k]);
-                let along = self.tx[i] * to.tx[*k] + self.ty[i] * to.ty[*k];
+        let one = |k: usize| {
+            let apart = |i: &usize| {
+                let (dx, dy) = (self.x[*i] - to.x[k], self.y[*i] - to.y[k]);
+                let along = self.tx[*i] * to.tx[k] + self.ty[*i] * to.ty[k];
                 dx * dx + dy * dy + 4.0 * (1.0 - along)
             };
-            let nearest = (0..to.len()).min_by(|a, b| apart(a).total_cmp(&apart(b)));
-            if let Some(k) = nearest {
-                let stretch = f64::from(self.length[i] / to.length[k]);
-                let by = [by[0], by[1], by[2] * stretch, by[3]];
-                out[k].iter_mut().zip(by).for_each(|(sum, by)| *sum += by);
-            }
-        }
-        out
+            let nearest = (0..self.len()).min_by(|a, b| apart(a).total_cmp(&apart(b)));
+            let by = nearest.and_then(|i| Some((i, by_piece.get(i)?)));
+            by.map_or([0.0; 4], |(i, [x, y, length, angle])| {
+                let share = f64::from(to.length[k] / self.length[i]);
+                [x * share, y * share, *length, angle * share]
+            })
+        };
+        (0..to.len()).map(one).collect()
     }
 
     /// Calls `f` for each piece in turn, hidden or not.

@@ -17,7 +17,7 @@ fn egg(h: f64) -> Vec<Profile> {
 }
 
 fn placed(p: [f64; 8]) -> Solid {
-    let solid = Solid::exact_lathe(&egg(p[7]), 12, 0.0, Caps::None).unwrap();
+    let solid = Solid::exact_lathe(&egg(p[7]), 96, 0.0, Caps::None).unwrap();
     let inner = Affine::new(DVec3::ZERO, DVec3::new(0.0, 0.3, 0.1), DVec3::new(1.0, 0.9, 1.1));
     let outer = Affine::new(
         DVec3::new(0.1 + p[0], p[1], p[2]),
@@ -38,7 +38,7 @@ fn views_draw_a_single_lathe_exactly_and_derive_by_its_mesh() {
     let by = weighted(&contours).1;
     let by_vertex = here.vjp_contours(128, &by);
     assert_eq!(by_vertex.len(), here.solid().vertex_count());
-    let mut wrong = 0.0f64;
+    let mut slopes = Vec::new();
     for k in 0..8 {
         let h = 1e-2;
         let at = |h: f64| view(std::array::from_fn(|i| if i == k { h } else { 0.0 }));
@@ -46,9 +46,12 @@ fn views_draw_a_single_lathe_exactly_and_derive_by_its_mesh() {
         let slope = (value(&at(h)) - value(&at(-h))) / (2.0 * h);
         let (before, after) = (at(-1e-3), at(1e-3));
         let found = along(&by_vertex, before.solid(), after.solid(), 2e-3);
-        wrong = wrong.max((found - slope).abs() - 0.01 * slope.abs());
+        slopes.push([found, slope]);
     }
-    assert!(wrong < 0.3, "{wrong}");
+    // The mesh only approaches the surface: within a twentieth of the greatest slope.
+    let most = slopes.iter().fold(0.0f64, |most, [_, slope]| most.max(slope.abs()));
+    let near = |[found, slope]: &[f64; 2]| (found - slope).abs() < 0.05 * most;
+    assert!(slopes.iter().all(near), "{slopes:?}");
 }
 
 #[test]
