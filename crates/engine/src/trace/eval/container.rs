@@ -26,12 +26,7 @@ enum Found {
 
 impl Graph {
     /// Determines the keys of a container and the draws of its elements.
-    pub(super) fn evaluate_container(
-        &mut self,
-        code: &Code,
-        n: NodeId,
-        sources: &[ElementDraw],
-    ) -> Step {
+    pub(super) fn evaluate_container(&mut self, n: NodeId, sources: &[ElementDraw]) -> Step {
         let frame = self.store[n].frame;
         let mut deps = Deps::new();
         let entries = if let [ElementDraw { loops, keys, .. }] = sources
@@ -47,16 +42,9 @@ impl Graph {
             let mut entries = IndexMap::new();
             for (i, source) in sources.iter().enumerate() {
                 let mut passes = SmallVec::new();
-                if let Some(step) = self.walk(
-                    code,
-                    n,
-                    frame,
-                    source,
-                    i as u32,
-                    &mut passes,
-                    &mut deps,
-                    &mut entries,
-                )? {
+                if let Some(step) =
+                    self.walk(n, frame, source, i as u32, &mut passes, &mut deps, &mut entries)?
+                {
                     return Ok(step);
                 }
             }
@@ -81,7 +69,6 @@ impl Graph {
     #[allow(clippy::too_many_arguments)]
     fn walk(
         &mut self,
-        code: &Code,
         n: NodeId,
         frame: FrameId,
         source: &ElementDraw,
@@ -100,7 +87,7 @@ impl Graph {
             for i in 0..count {
                 let inner = self.pass_frame(node, i)?;
                 passes.push(i as u32);
-                let step = self.walk(code, n, inner, source, index, passes, deps, entries)?;
+                let step = self.walk(n, inner, source, index, passes, deps, entries)?;
                 passes.pop();
                 if step.is_some() {
                     return Ok(step);

@@ -73,7 +73,7 @@ impl Graph {
             Op::For { iter, body } => self.evaluate_for(n, *iter, *body),
             Op::Map { f, over, .. } => self.evaluate_map(n, *f, *over),
             Op::Fold { f, init, over, .. } => self.evaluate_fold(n, *f, *init, *over),
-            Op::Container { sources, .. } => self.evaluate_container(code, n, sources),
+            Op::Container { sources, .. } => self.evaluate_container(n, sources),
             Op::Gather => self.evaluate_gather(code, n),
             Op::Mem { f, .. } => self.evaluate_mem(n, *f),
             Op::Draw { dist, site, keys } => self.evaluate_draw(n, dist, *site, keys),
