@@ -151,7 +151,7 @@ mod tests {
         assert_eq!(direction(&[8.0, 4.0], &past), [2.0, 1.0]);
     }
 
-    /// Makes at most so many steps with all choices from a state.
+    /// Makes at most that many steps with all choices from a state.
     fn climb_all(trace: &mut Trace, steps: u32) {
         let (at, mut memory) = (StepContext::new(1, 0, 0), Memory::default());
         let targets = trace.all_targets().to_vec();
