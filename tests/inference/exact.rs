@@ -528,30 +528,13 @@ fn particles_find_both_modes() {
 #[test]
 fn simulated_data_stand_in_for_the_likelihood() {
     let text = "assume p ~ beta(1, 1); observe binomial(10, p) = 7;";
-    for (kernel, warmup, steps) in [(2, 500, 120_000), (3, 2, 12_000)] {
-        let kernel = kernels::exact::SIMULATED[kernel];
-        let infer = format!(
-            "infer {{ warmup {warmup} {{ {kernel}; }} repeat {steps} {{ {kernel}; collect p; }} }}"
-        );
-        let d = run(&format!("{text} {infer}"), 1, 2);
-        assert_mean(&format!("p by {kernel}"), &d["p"], 8.0 / 12.0, 0.03);
-        let squares: Vec<f64> = d["p"].iter().map(|p| p * p).collect();
-        assert_mean(&format!("p^2 by {kernel}"), &squares, 8.0 * 9.0 / (12.0 * 13.0), 0.04);
-    }
-}
-
-/// The fraction of simulated data that are close enough is estimated without bias: 7
-/// heads of 10 have probability 1 / 11.
-#[test]
-fn falling_tolerances_give_the_probability_of_the_data() {
-    let kernel = kernels::exact::SIMULATED[3];
-    let model = pcadlang::Model::from_text(&format!(
-        "assume p ~ beta(1, 1); observe binomial(10, p) = 7; infer {{ repeat 20000 {{ {kernel}; }} }}"
-    ))
-    .unwrap_or_else(|e| panic!("{e}"));
-    let posterior = model.run(&Default::default(), 1, 1).unwrap_or_else(|e| panic!("{e}"));
-    let log = posterior.chains[0].kernels[0].log_evidence.unwrap_or(f64::NAN);
-    assert!((log + 11f64.ln()).abs() < 0.03, "{log}");
+    let kernel = kernels::exact::SIMULATED[2];
+    let infer =
+        format!("infer {{ warmup 500 {{ {kernel}; }} repeat 120000 {{ {kernel}; collect p; }} }}");
+    let d = run(&format!("{text} {infer}"), 1, 2);
+    assert_mean(&format!("p by {kernel}"), &d["p"], 8.0 / 12.0, 0.03);
+    let squares: Vec<f64> = d["p"].iter().map(|p| p * p).collect();
+    assert_mean(&format!("p^2 by {kernel}"), &squares, 8.0 * 9.0 / (12.0 * 13.0), 0.04);
 }
 
 /// A choice that vanishes together with the value on which its own mean depends.

@@ -56,7 +56,7 @@ const PROMISED: &[(&str, &[&str])] = &[
     ("crates/inference/src/kernels/slice.rs", &["Slice"]),
     ("crates/inference/src/kernels/elliptical.rs", &["Elliptical"]),
     ("crates/report/src/rundir.rs", &["RunDir", "RunDirError"]),
-    ("crates/report/src/sinks.rs", &[]),
+    ("crates/report/src/sinks.rs", &["Memory", "Tee"]),
     ("crates/report/src/draws.rs", &["ChainDraws", "Quantity", "quantities"]),
     ("crates/report/src/csv/write.rs", &["CsvSink"]),
     ("crates/syntax/src/diag/diagnostic.rs", &["Diagnostic", "Label", "Severity"]),

@@ -128,7 +128,7 @@ fn an_error_leaves_everything_as_it_was() {
         ("let fine = 2; sample [1][3];", "3"),
     ] {
         let said =
-            s.enter(text).map_or_else(|e| e.to_string(), |r| format!("(accepted) {}", r.text));
+            s.enter(text).map_or_else(|e| e.with_hint(), |r| format!("(accepted) {}", r.text));
         if !said.contains(why) || said.starts_with("(accepted)") || state(&s) != before {
             wrong += &format!("{text}: {why:?} is not in\n{said}\n");
         }

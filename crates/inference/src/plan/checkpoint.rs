@@ -101,4 +101,9 @@ impl Checkpoint {
     pub fn steps(&self) -> u64 {
         self.step
     }
+
+    /// True if the plan is finished.
+    pub fn is_finished(&self) -> bool {
+        self.finished
+    }
 }

@@ -82,11 +82,13 @@ impl Diagnostic {
     }
 
     /// Adds a hint in place.
+    #[doc(hidden)]
     pub fn hint_also(&mut self, hint: impl Into<String>) {
         self.hints.push(hint.into());
     }
 
     /// Adds a label that helps to explain the error, in place.
+    #[doc(hidden)]
     pub fn point_at(&mut self, span: Span, text: &str) {
         self.labels.push(Label { span, text: text.into(), primary: false });
     }

@@ -45,11 +45,12 @@ impl Graph {
                 }
                 continue;
             }
-            let unreachable =
-                if self.update.stale_choices.is_empty() { Vec::new() } else { self.unreachable() };
-            let stays = |n: &NodeId| {
-                self.store[*n].state == State::Stale && unreachable.binary_search(n).is_err()
+            let is_stale = |n: &NodeId| self.store[*n].state == State::Stale;
+            let unreachable = match self.update.stale_choices.iter().any(is_stale) {
+                true => self.unreachable(),
+                false => Vec::new(),
             };
+            let stays = |n: &NodeId| is_stale(n) && unreachable.binary_search(n).is_err();
             let next = self
                 .update
                 .stale_choices

@@ -150,10 +150,7 @@ fn traits(a: &Argument) -> String {
         Domain::Between01 => s.push_str(" between 0 and 1"),
         Domain::Below1 => s.push_str(" from 0 to below 1"),
         Domain::Whole([low, high]) => drop(write!(s, " from {low} to {high}")),
-        Domain::Words(words) => {
-            let quoted: Vec<String> = words.iter().map(|w| format!("\"{w}\"")).collect();
-            let _ = write!(s, ", {}", quoted.join(" or "));
-        }
+        words @ Domain::Words(_) => drop(write!(s, ", {words}")),
     }
     if !a.unit.is_empty() {
         let _ = write!(s, ", {}", a.unit);
