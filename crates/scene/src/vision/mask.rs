@@ -3,8 +3,9 @@
 //! in the program.
 
 use super::error::{VisionError, read_bytes};
+use super::npy;
+use super::pictures::photo::resize_rows;
 use super::pictures::photo::{Limits, decode_dynamic};
-use super::{npy, resize};
 use pcadlang_numerics::rng::Stream;
 use std::path::Path;
 
@@ -48,7 +49,7 @@ impl Mask {
             return self.clone();
         }
         let w = self.width as usize;
-        let area = resize::resize_rows((self.width, self.height), (width, height), |j, row| {
+        let area = resize_rows((self.width, self.height), (width, height), |j, row| {
             for (p, &m) in row.iter_mut().zip(self.data.iter().skip(j as usize * w)) {
                 *p = [f32::from(u8::from(m))];
             }
