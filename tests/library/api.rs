@@ -10,7 +10,6 @@ const PROMISED: &[(&str, &[&str])] = &[
     ("crates/library/src/model.rs", &[]),
     ("crates/library/src/model/program.rs", &[]),
     ("crates/library/src/scene/inputs.rs", &[]),
-    ("crates/library/src/model/hosted.rs", &[]),
     ("crates/syntax/src/diag/error.rs", &[]),
     ("crates/inference/src/host/mod.rs", &[]),
     ("crates/inference/src/host/entry.rs", &[]),
