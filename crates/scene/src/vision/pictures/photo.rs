@@ -3,11 +3,10 @@
 //! is upright (Exif orientation applied), is opaque (alpha composited over white in sRGB
 //! values, as viewers do) and has at least one pixel.
 
-use crate::vision::error::{VisionError, read_bytes};
+use crate::vision::error::VisionError;
 use crate::vision::pictures::color::{linear_table, linear_to_byte, linear_to_srgb};
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, RgbImage};
 use std::io::Cursor;
-use std::path::Path;
 
 /// Limits on the size of a picture. The size in the header is checked before memory is
 /// allocated for pixels.
@@ -40,9 +39,9 @@ impl Limits {
         Ok(())
     }
 
-    /// The maximum number of bytes of a file: 16 per pixel, more than any supported
-    /// format needs uncompressed.
-    pub(crate) fn max_bytes(&self) -> u64 {
+    /// The maximum number of bytes to decode: 16 per pixel, more than any supported format
+    /// needs uncompressed.
+    fn max_bytes(&self) -> u64 {
         self.max_pixels.saturating_mul(16).saturating_add(1 << 20)
     }
 }
@@ -144,11 +143,6 @@ impl Photo {
         }
         Photo { rgb, focal_35mm: self.focal_35mm }
     }
-}
-
-/// Reads a photograph from a PNG or JPEG file.
-pub fn load(path: &Path, limits: &Limits) -> Result<Photo, VisionError> {
-    decode(&read_bytes(path, limits.max_bytes())?, limits).map_err(|e| e.in_file(path))
 }
 
 /// Reads a photograph from the bytes of a PNG or JPEG file.
