@@ -13,7 +13,7 @@ use pcadlang_scene::vision::features::{Query, contour_features, observed, render
 use pcadlang_scene::vision::{
     Chamfer, ChamferOptions, ContourMap, ContourRatio, ContourRatioOptions, DepthLikelihood,
     DepthMap, GradientDetector, Limits, Mask, MaskLikelihood, Region, RegionOptions, chamfer,
-    contour_ratio, distance_transform, gradient, nms, photo,
+    contour_ratio, distance_transform, gradient, photo,
 };
 use std::hint::black_box;
 
@@ -109,7 +109,7 @@ fn load(c: &mut Criterion) {
         b.iter(|| gradient::colour_gradient(SIDE, SIDE, black_box(&linear), 1.6))
     });
     let slopes = gradient::colour_gradient(SIDE, SIDE, &linear, 1.6);
-    c.bench_function("load/maxima", |b| b.iter(|| nms::suppress(black_box(&slopes), 0.0)));
+    c.bench_function("load/maxima", |b| b.iter(|| gradient::suppress(black_box(&slopes), 0.0)));
     let fine = GradientDetector { size: SIDE, ..GradientDetector::default() };
     for (size, detector) in [(256, GradientDetector::default()), (SIDE, fine)] {
         c.bench_function(&format!("load/detect at {size}"), |b| {

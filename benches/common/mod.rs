@@ -77,7 +77,8 @@ pub fn picture(name: &str) -> std::path::PathBuf {
 
 /// Loads the photograph of the skier at `side` by `side` pixels.
 pub fn photograph(side: u32) -> Photo {
-    let photo = photo::load(&picture("skier.jpg"), &Limits::default()).expect("a photograph");
+    let bytes = std::fs::read(picture("skier.jpg")).expect("a photograph");
+    let photo = photo::decode(&bytes, &Limits::default()).expect("a photograph");
     Photo::from_rgb(resize(photo.rgb(), side, side, FilterType::Triangle))
         .expect("a photograph with pixels")
 }

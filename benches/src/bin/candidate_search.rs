@@ -5,15 +5,14 @@
 
 use pcadlang_scene::vision::Limits;
 use pcadlang_scene::vision::candidates::{CandidateOptions, candidates};
-use pcadlang_scene::vision::photo::load;
+use pcadlang_scene::vision::photo::decode;
 use std::error::Error;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::path::Path;
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn Error>> {
     for path in std::env::args().skip(1) {
-        let photo = load(Path::new(&path), &Limits::default())?;
+        let photo = decode(&std::fs::read(&path)?, &Limits::default())?;
         let start = Instant::now();
         let found = candidates(&photo, &CandidateOptions::default());
         let seconds = start.elapsed().as_secs_f64();

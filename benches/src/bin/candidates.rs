@@ -30,9 +30,10 @@ fn overlap(a: &Mask, b: &Mask) -> f64 {
 }
 
 fn look(folder: &Path, options: &CandidateOptions) -> Result<Outcome, String> {
-    let photo =
-        photo::load(&folder.join("image.png"), &Limits::default()).map_err(|e| e.to_string())?;
-    let truth = mask::load(&folder.join("mask.png")).map_err(|e| e.to_string())?;
+    let read = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
+    let (limits, image, truth) = (Limits::default(), read("image.png")?, read("mask.png")?);
+    let photo = photo::decode(&image, &limits).map_err(|e| e.to_string())?;
+    let truth = mask::decode(&truth, &limits).map_err(|e| e.to_string())?;
     let start = Instant::now();
     let found = candidates(&photo, options);
     let seconds = start.elapsed().as_secs_f64();

@@ -17,7 +17,7 @@ use pcadlang_scene::vision::chamfer::{Chamfer, ChamferOptions};
 use pcadlang_scene::vision::features::{Query, observed};
 use pcadlang_scene::vision::{
     ContourMap, ContourRatio, ContourRatioOptions, DepthMap, GradientDetector, Limits, Mask, Photo,
-    Region, RegionOptions, distance_transform, gradient, nms, photo,
+    Region, RegionOptions, distance_transform, gradient, photo,
 };
 use std::error::Error;
 use std::fmt::Debug;
@@ -92,7 +92,7 @@ fn picture(name: &str, photo: &Photo, digest: bool) -> Result<(), Box<dyn Error>
         Box::new(gradient::colour_gradient(SIDE, SIDE, &linear, 1.6))
     });
     let slopes = gradient::colour_gradient(SIDE, SIDE, &linear, 1.6);
-    stage("maxima", &mut || Box::new(nms::suppress(&slopes, 0.0)));
+    stage("maxima", &mut || Box::new(gradient::suppress(&slopes, 0.0)));
     let fine = GradientDetector { size: SIDE, ..GradientDetector::default() };
     for (size, detector) in [(256, GradientDetector::default()), (SIDE, fine)] {
         stage(&format!("detector at {size}"), &mut || Box::new(detector.contours(photo)));

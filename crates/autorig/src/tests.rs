@@ -27,6 +27,13 @@ fn boxes(all: &[(&str, DVec3, DVec3)]) -> Mesh {
     obj::load(text.as_bytes()).unwrap()
 }
 
+/// The vertices of a body in a pose, in the order of its positions.
+fn posed_vertices(body: &Armature, pose: &[JointPose]) -> Vec<DVec3> {
+    let t = body.rig().transforms(pose, &Rules::default()).unwrap();
+    let all = body.positions().iter().zip(body.influences());
+    all.map(|(p, i)| i.blend(&t, p.as_dvec3())).collect()
+}
+
 fn chain() -> Mesh {
     let x = |x: f64| DVec3::new(x, 0.0, 0.0);
     let size = DVec3::new(2.0, 0.5, 0.5);
@@ -48,7 +55,7 @@ fn sound(a: &Armature) {
                 && i.weights.iter().all(|w| *w >= 0.0)
         );
     }
-    let rest = a.posed_vertices(&[], &Rules::default()).unwrap();
+    let rest = posed_vertices(&a, &[]);
     assert!(rest.iter().zip(a.positions()).all(|(p, q)| (*p - q.as_dvec3()).length() < 1e-6));
     for (j, k) in a.rig().joints().iter().zip(a.rig().keypoints()) {
         assert!(j.name == k.name && j.head == k.rest);
@@ -86,7 +93,7 @@ fn three_boxes_in_a_row_are_three_bones() {
     }
     let mut pose = vec![JointPose::REST; 3];
     pose[a.rig().find("hand").unwrap()] = JointPose::turned(DVec3::new(0.0, 0.0, 1.0));
-    let turned = a.posed_vertices(&pose, &Rules::default()).unwrap();
+    let turned = posed_vertices(&a, &pose);
     for (p, q) in a.positions().iter().zip(turned) {
         assert_eq!((p.as_dvec3() - q).length() > 0.1, p.x > 2.9, "{p} to {q}");
     }
@@ -180,7 +187,7 @@ fn a_star_has_a_branch_for_each_tip() {
         let last = (0..joints.len()).find(|i| (joints[*i].tail - tips[0]).length() < 0.25).unwrap();
         let mut pose = vec![JointPose::REST; joints.len()];
         pose[last] = JointPose::turned(DVec3::new(0.0, 0.0, 0.5));
-        let turned = a.posed_vertices(&pose, &Rules::default()).unwrap();
+        let turned = posed_vertices(&a, &pose);
         for (p, q) in a.positions().iter().zip(turned) {
             let (p, moved) = (p.as_dvec3(), (p.as_dvec3() - q).length());
             assert!((p - tips[0]).length() > 0.3 || moved > 0.3, "{p}");

@@ -1,6 +1,6 @@
 //! Records draws: determines the columns, and flattens values into them.
 
-use super::columns::{Column, MOST_POINTS, POINTWISE, Shape, merged};
+use super::draws::{Column, MOST_POINTS, POINTWISE, Shape, merged};
 use pcadlang_engine::lang::code::{Code, Operand};
 use pcadlang_engine::lang::error::RunError;
 use pcadlang_engine::lang::plan::{Plan, StepKind};

@@ -1,7 +1,6 @@
 //! Embedding: a program compiled with its data, run to a posterior, in a few calls.
 
 mod edited;
-mod hosted;
 mod program;
 mod started;
 

@@ -24,7 +24,7 @@ pub fn write_atomically(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<(
 /// A file under its temporary name, and its final path.
 pub(super) struct PartialFile(PathBuf, PathBuf);
 
-/// Writes a file in a folder under a temporary name; [`Partial::end`] gives it its final
+/// Writes a file in a folder under a temporary name; [`PartialFile::end`] gives it its final
 /// name.
 ///
 /// # Errors
@@ -71,7 +71,7 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_atomically(path.parent().unwrap_or(Path::new("")), name, bytes)
 }
 
-/// Returns whether a file is partially written, by the names that [`write_whole`] uses.
+/// Returns whether a file is partially written, by the name that [`begin`] gives.
 pub(super) fn is_partial(name: &str) -> bool {
     name.starts_with('.') && name.ends_with(PARTIAL)
 }

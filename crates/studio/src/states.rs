@@ -14,7 +14,7 @@ use pcadlang_runs::inputs::Ready;
 use pcadlang_runs::reopening::film::best_chain;
 use pcadlang_runs::reopening::reopened::Reopened;
 use pcadlang_runs::scene;
-use pcadlang_scene::render::{Camera, Projection, View};
+use pcadlang_scene::render::{Camera, View};
 use pcadlang_workbench::session::Layer;
 use serde_json::{Map, Value, json};
 use std::collections::VecDeque;
@@ -183,16 +183,12 @@ fn seen_from(v: Viewpoint, other: &Camera) -> Result<Camera, Failure> {
             "`camera` needs an eye, another target, and an up that is not the direction between them",
         )
     };
-    let [eye, target, up] = [v.eye, v.target, v.up].map(DVec3::from_array);
-    let forward = (target - eye).try_normalize().ok_or_else(wrong)?;
-    let right = forward.cross(up).try_normalize().ok_or_else(wrong)?;
-    if !eye.is_finite() || !(1.0..=170.0).contains(&v.fov_y) {
+    let places = [v.eye, v.target, v.up].map(DVec3::from_array);
+    if !places[0].is_finite() || !(1.0..=170.0).contains(&v.fov_y) {
         return Err(wrong());
     }
-    let (width, height) = (f64::from(other.width), f64::from(other.height));
-    let focal_px = 0.5 * height / (0.5 * v.fov_y.to_radians()).tan();
-    let projection = Projection::Pinhole { focal_px, cx: 0.5 * width, cy: 0.5 * height };
-    Ok(Camera { eye, right, up: right.cross(forward), forward, projection, ..*other })
+    let focal_px = 0.5 * f64::from(other.height) / (0.5 * v.fov_y.to_radians()).tan();
+    Camera::looking_at(places, focal_px, (other.width, other.height)).ok_or_else(wrong)
 }
 
 /// Maximum cached pictures per run.

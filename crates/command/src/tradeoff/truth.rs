@@ -64,7 +64,10 @@ pub fn surface(folder: &Path, camera: Option<&Path>) -> Result<Option<SurfaceTru
         };
         (member("depth")?, member("normals")?)
     } else if single.is_file() {
-        let read = |path: &Path| npy::load(path, MOST_BYTES).map_err(|e| plain(e.to_string()));
+        let read = |path: &Path| {
+            let array = npy::parse(&files::read(path)?);
+            array.map_err(|e| plain(format!("{}: {e}", path.display())))
+        };
         let normals = Some(folder.join("normals.npy")).filter(|p| p.is_file());
         (Some(read(&single)?), normals.map(|p| read(&p)).transpose()?)
     } else {

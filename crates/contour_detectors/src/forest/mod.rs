@@ -22,7 +22,7 @@ mod writer;
 pub use options::ForestOptions;
 
 use features::Features;
-use pcadlang_scene::vision::resize::fitted;
+use pcadlang_scene::vision::photo::fitted;
 use pcadlang_scene::vision::{ContourDetector, Photo, Shows, SoftMap, VisionError};
 use std::fmt;
 

@@ -7,7 +7,7 @@
 mod tests;
 
 use crate::options::{NetworkOptions, Output};
-use pcadlang_scene::vision::resize::fitted;
+use pcadlang_scene::vision::photo::fitted;
 use pcadlang_scene::vision::{ContourDetector, Photo, Shows, SoftMap, VisionError};
 use rten::{DataType, Dimension, Model, NodeId, Value, ValueType};
 use std::fmt;

@@ -186,7 +186,7 @@ mod shipped {
 
     fn skier() -> Photo {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/images/skier.jpg");
-        photo::load(path.as_ref(), &Limits::default()).unwrap()
+        photo::decode(&std::fs::read(path).unwrap(), &Limits::default()).unwrap()
     }
 
     /// All numbers of people, as bits.

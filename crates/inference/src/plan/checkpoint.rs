@@ -6,7 +6,7 @@
 //! random streams are determined by step and address; caches are rebuilt.
 
 use super::place::PlanPosition;
-use crate::columns::Column;
+use crate::draws::Column;
 use crate::plain::Plain;
 use crate::population::Population;
 use crate::state::{StateError, holds, pack, unpack};

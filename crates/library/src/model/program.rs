@@ -12,6 +12,7 @@ use pcadlang_engine::lang::lower::{Inputs, Interface, compile, inspect};
 use pcadlang_engine::lang::reach::{Outside, Reach, folder_of, read_file};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::Limits;
+use pcadlang_inference::host::Host;
 use pcadlang_report::{bytes_hash, text_hash};
 use pcadlang_syntax::diag::{Diagnostic, Severity, SourceMap};
 use rustc_hash::FxHashMap;
@@ -320,6 +321,16 @@ impl Program {
             }
             Err(diagnostics) => Err(Error { diagnostics, sources: self.sources }),
         }
+    }
+
+    /// Lets the program call what a host brings.
+    ///
+    /// # Errors
+    /// If the host brings a name of the language without saying that it replaces it, or
+    /// something is wrong with what it brings.
+    pub fn host(mut self, host: &Host) -> Result<Program, Error> {
+        self.builtins = host.table(&standard::table())?;
+        Ok(self)
     }
 }
 

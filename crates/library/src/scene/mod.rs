@@ -12,10 +12,8 @@ mod compare;
 mod compare_depths;
 mod compare_keypoints;
 pub mod data;
-mod edges;
 mod examples;
 mod inputs;
-
 mod objects;
 mod observed;
 mod people;
@@ -77,7 +75,7 @@ pub fn host() -> Host {
         seeing::TABLE,
         compare::TABLE,
         region::TABLE,
-        edges::TABLE,
+        observed::TABLE,
         people::TABLE,
         candidates::TABLE,
         compare_keypoints::TABLE,

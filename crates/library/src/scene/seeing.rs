@@ -6,7 +6,7 @@ use pcadlang_engine::lang::adjoint::Adjoint;
 use pcadlang_engine::lang::builtins::{Args, Default, Row, Type, arg, int, num, opt};
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_engine::lang::value::Value;
-use pcadlang_scene::render::{Camera, Projection, View};
+use pcadlang_scene::render::{Camera, View};
 use smallvec::smallvec;
 use std::sync::Arc;
 
@@ -34,30 +34,15 @@ pub(super) const TABLE: &[Row] = &[
         "A pinhole camera. By default a view uses the camera of the run: `--camera`, or the default view.",
         |a| {
             let vector = |name: &str| a.vec3(name).map(DVec3::from);
-            let (eye, target, up) = (vector("position")?, vector("look_at")?, vector("up")?);
+            let places = [vector("position")?, vector("look_at")?, vector("up")?];
             let (focal, width, height) = (a.num("focal")?, a.int("width")?, a.int("height")?);
-            let forward = (target - eye).try_normalize();
-            let right = forward.and_then(|f| f.cross(up).try_normalize());
-            let (Some(forward), Some(right)) = (forward, right) else {
-                return Err(Fault::domain(
+            let focal_px = focal * f64::from(width.max(height));
+            let camera = Camera::looking_at(places, focal_px, (width, height));
+            camera.map(|c| Value::object(CameraValue(c))).ok_or_else(|| {
+                Fault::domain(
                     "scene.camera: the viewing direction must not be zero or parallel to `up`",
-                ));
-            };
-            let projection = Projection::Pinhole {
-                focal_px: focal * f64::from(width.max(height)),
-                cx: f64::from(width) / 2.0,
-                cy: f64::from(height) / 2.0,
-            };
-            let up = right.cross(forward);
-            Ok(Value::object(CameraValue(Camera {
-                eye,
-                right,
-                up,
-                forward,
-                width,
-                height,
-                projection,
-            })))
+                )
+            })
         },
     ),
     incremental(

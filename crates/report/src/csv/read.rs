@@ -1,7 +1,6 @@
 //! Reads draws from CSV: line by line, draw by draw, or a whole file.
 
-use super::DRAW_COLUMNS;
-use super::write::columns;
+use super::{DRAW_COLUMNS, columns};
 use crate::ChainDraws;
 use pcadlang_inference::draws::{Column, DrawRow, Layout, merged, width};
 use std::io::{self, BufRead, Take};

@@ -53,19 +53,6 @@ impl Affine {
         self.0.matrix3.determinant() < 0.0
     }
 
-    /// Returns an upper bound on the factor by which the map lengthens any line. It is
-    /// exact where a scale's axes stay perpendicular; otherwise it is Gershgorin's bound
-    /// on the squared linear part.
-    pub fn stretch(&self) -> f64 {
-        let m = self.0.matrix3;
-        let square = (m.transpose() * m).to_cols_array_2d();
-        square
-            .iter()
-            .map(|column| column.iter().map(|x| x.abs()).sum::<f64>())
-            .fold(0.0, f64::max)
-            .sqrt()
-    }
-
     /// Returns the inverse map, if it exists.
     pub fn inverse(&self) -> Option<Affine> {
         let d = self.0.matrix3.determinant();
@@ -90,19 +77,6 @@ impl Mul for Affine {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn no_line_gets_longer_than_by_the_stretch() {
-        let turned = Affine::new(DVec3::X, DVec3::new(0.4, 1.0, -2.0), DVec3::new(2.0, -3.0, 0.5));
-        assert!((turned.stretch() - 3.0).abs() < 1e-12);
-        let sheared = Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(1.0, 4.0, 1.0)) * turned;
-        for k in 0..100 {
-            let angle = f64::from(k);
-            let way =
-                DVec3::new(libm::cos(angle), libm::sin(angle), libm::sin(3.0 * angle)).normalize();
-            assert!((sheared.0.matrix3 * way).length() <= sheared.stretch() + 1e-12);
-        }
-    }
 
     #[test]
     fn order_is_scale_turns_shift() {

@@ -105,6 +105,20 @@ impl Camera {
         }
     }
 
+    /// A pinhole at `eye` that looks at `target` in a picture of this width and height, with
+    /// `up` towards its top edge; `None` if the viewing direction is zero or parallel to `up`.
+    pub fn looking_at(
+        [eye, target, up]: [DVec3; 3],
+        focal_px: f64,
+        (width, height): (u32, u32),
+    ) -> Option<Camera> {
+        let forward = (target - eye).try_normalize()?;
+        let right = forward.cross(up).try_normalize()?;
+        let (cx, cy) = (f64::from(width) / 2.0, f64::from(height) / 2.0);
+        let projection = Projection::Pinhole { focal_px, cx, cy };
+        Some(Camera { eye, right, up: right.cross(forward), forward, width, height, projection })
+    }
+
     /// The same view with the longer side at `longer_side` pixels (1 to
     /// [`Camera::MAX_SIDE`]); the shorter side is rounded to whole pixels, at least 1.
     pub fn scaled_to(&self, longer_side: u32) -> Camera {

@@ -9,12 +9,11 @@ mod tally;
 
 pub use self::tally::DepthTally;
 
-use super::error::{VisionError, read_bytes};
+use super::error::VisionError;
 use super::pictures::npy;
 use super::pictures::photo::{Limits, decode_dynamic};
 use pcadlang_numerics::num::LN_SQRT_2PI;
 use pcadlang_numerics::rng::Stream;
-use std::path::Path;
 
 /// A depth map in row-major order. Every value is positive and finite, `+inf`
 /// (background) or NaN (missing).
@@ -69,15 +68,9 @@ impl DepthMap {
     }
 }
 
-/// Reads a depth map: a grey PNG (16 or 8 bit; depth = value / `scale`, 0 is background)
+/// Reads a depth map from bytes: a grey PNG (16 or 8 bit; depth = value / `scale`, 0 is background)
 /// or a `.npy` array of two axes (depth = value / `scale`; 0, negative and `inf` are
 /// background, NaN is missing).
-pub fn load(path: &Path, scale: f64) -> Result<DepthMap, VisionError> {
-    let limits = Limits::default();
-    decode(&read_bytes(path, limits.max_bytes())?, scale, &limits).map_err(|e| e.in_file(path))
-}
-
-/// Like [`load`], from the bytes of a file.
 pub fn decode(bytes: &[u8], scale: f64, limits: &Limits) -> Result<DepthMap, VisionError> {
     if !(scale > 0.0 && scale.is_finite()) {
         return Err(VisionError::Range { name: "scale", rule: "positive", value: scale });
@@ -441,9 +434,5 @@ mod tests {
             (INF, INF, 3.0, 3.0)
         );
         assert_eq!(big.resized(2, 2).data()[2], 3.0);
-        assert!(matches!(
-            load(Path::new("no/such.png"), 1.0).unwrap_err().cause(),
-            VisionError::Missing
-        ));
     }
 }

@@ -1,23 +1,10 @@
 //! Errors of pictures and arrays of pixels. Messages describe the faulty input in the
 //! user's terms.
 
-use std::path::{Path, PathBuf};
-
 /// An error of reading or comparing pictures.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VisionError {
-    /// An error in a file.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// The error.
-        source: Box<VisionError>,
-    },
-    /// The file does not exist.
-    #[error("no such file")]
-    Missing,
     /// The file could not be read.
     #[error("cannot read the file: {0}")]
     Io(#[from] std::io::Error),
@@ -48,14 +35,6 @@ pub enum VisionError {
         /// The most pixels allowed.
         max_pixels: u64,
     },
-    /// The file has more bytes than any allowed picture needs.
-    #[error("the file is too large: {bytes} bytes, at most {max_bytes}")]
-    TooManyBytes {
-        /// Bytes in the file.
-        bytes: u64,
-        /// The most allowed.
-        max_bytes: u64,
-    },
     /// A `.npy` file that cannot be used.
     #[error("not a usable .npy array: {0}")]
     Npy(String),
@@ -85,37 +64,8 @@ pub enum VisionError {
 }
 
 impl VisionError {
-    /// Wraps the error with the file's name.
-    pub fn in_file(self, path: &Path) -> Self {
-        VisionError::File { path: path.to_path_buf(), source: Box::new(self) }
-    }
-
-    /// Returns the underlying error, without the file's name.
-    pub fn cause(&self) -> &VisionError {
-        match self {
-            VisionError::File { source, .. } => source.cause(),
-            other => other,
-        }
-    }
-
     /// An error of differing sizes.
     pub(crate) fn size(expected_width: u32, expected_height: u32, got: impl Into<String>) -> Self {
         VisionError::Size { expected_width, expected_height, got: got.into() }
     }
-}
-
-/// Reads all bytes of a file of at most `max_bytes`.
-pub(crate) fn read_bytes(path: &Path, max_bytes: u64) -> Result<Vec<u8>, VisionError> {
-    let read = || {
-        let found = std::fs::metadata(path).map_err(|e| match e.kind() {
-            std::io::ErrorKind::NotFound => VisionError::Missing,
-            _ => VisionError::Io(e),
-        })?;
-        if found.len() > max_bytes {
-            return Err(VisionError::TooManyBytes { bytes: found.len(), max_bytes });
-        }
-        let bytes = std::fs::read(path)?;
-        if bytes.is_empty() { Err(VisionError::Empty) } else { Ok(bytes) }
-    };
-    read().map_err(|e: VisionError| e.in_file(path))
 }

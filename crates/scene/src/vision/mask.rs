@@ -2,11 +2,11 @@
 //! rendered one. There is no segmentation here: masks come from files or from elsewhere
 //! in the program.
 
-use super::error::{VisionError, read_bytes};
+use super::error::VisionError;
+use super::npy;
+use super::pictures::photo::resize_rows;
 use super::pictures::photo::{Limits, decode_dynamic};
-use super::{npy, resize};
 use pcadlang_numerics::rng::Stream;
-use std::path::Path;
 
 /// A mask, true on the object. `data` has `width * height` entries in row-major order.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,7 +48,7 @@ impl Mask {
             return self.clone();
         }
         let w = self.width as usize;
-        let area = resize::resize_rows((self.width, self.height), (width, height), |j, row| {
+        let area = resize_rows((self.width, self.height), (width, height), |j, row| {
             for (p, &m) in row.iter_mut().zip(self.data.iter().skip(j as usize * w)) {
                 *p = [f32::from(u8::from(m))];
             }
@@ -58,16 +58,10 @@ impl Mask {
     }
 }
 
-/// Reads a mask from a PNG or JPEG (bright pixels are the object; if any pixels are
+/// Reads a mask from the bytes of a PNG or JPEG (bright pixels are the object; if any pixels are
 /// transparent, opaque pixels are the object) or a `.npy` array of two axes (bool: true;
 /// numbers: above half of the type's range, 127 for uint8 and 0.5 for floats, or above 0
 /// for uint8 arrays without values above 1).
-pub fn load(path: &Path) -> Result<Mask, VisionError> {
-    let limits = Limits::default();
-    decode(&read_bytes(path, limits.max_bytes())?, &limits).map_err(|e| e.in_file(path))
-}
-
-/// Like [`load`], from the bytes of a file.
 pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Mask, VisionError> {
     if npy::is_npy(bytes) {
         let array = npy::parse(bytes)?;
@@ -339,9 +333,5 @@ mod tests {
         );
         let cut = image::RgbaImage::from_raw(2, 1, vec![255, 255, 255, 0, 0, 0, 0, 255]).unwrap();
         assert_eq!(decode(&png(cut.into()), &Limits::default()).unwrap().data(), [false, true]);
-        assert!(matches!(
-            load(Path::new("no/such.png")).unwrap_err().cause(),
-            VisionError::Missing
-        ));
     }
 }

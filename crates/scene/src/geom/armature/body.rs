@@ -6,8 +6,8 @@
 //! has silhouettes, but no creases, and no contours between parts. Vertices are single
 //! precision. Invariant: the meshes of a pose do not depend on earlier poses.
 
+use super::Rig;
 use super::morph::{Anchor, Morph};
-use super::{JointPose, Rig, Rules};
 use crate::geom::{Affine, GeomError, Instance, Mesh, Topology, edges, outer};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
 use std::sync::{Arc, LazyLock};
@@ -364,21 +364,6 @@ impl Armature {
             add(k.joint, 1.0, k.rest, *g);
         }
         out
-    }
-
-    /// Returns the posed vertices of the whole body, in the order of
-    /// [`Armature::positions`]; [`Armature::posed`] draws the same surface, by part.
-    ///
-    /// # Errors
-    /// A pose that is not finite.
-    pub fn posed_vertices(
-        &self,
-        pose: &[JointPose],
-        rules: &Rules,
-    ) -> Result<Vec<DVec3>, GeomError> {
-        let t = self.rig.transforms(pose, rules)?;
-        let all = self.positions().iter().zip(&self.skin.influences);
-        Ok(all.map(|(p, i)| i.blend(&t, p.as_dvec3())).collect())
     }
 }
 

@@ -204,33 +204,6 @@ fn write<T: Copy>(list: &mut [T], [first, count]: [usize; 2], values: &[T; LANES
     }
 }
 
-impl Revolution {
-    /// The depth at some pixels of a camera's image (row by row from the top): infinite
-    /// where the surface does not show, and everywhere if the placement is not invertible.
-    pub fn depth_at(&self, affine: &Affine, camera: &Camera, pixels: &[u32]) -> Vec<f32> {
-        let mut out = vec![f32::INFINITY; pixels.len()];
-        let Some(sight) = Sight::new(camera, affine) else { return out };
-        let width = camera.width.max(1);
-        let mut spans = Spans::default();
-        vectorised(
-            #[inline(always)]
-            || {
-                spans.set(self);
-                for (pixels, out) in pixels.chunks(LANES).zip(out.chunks_mut(LANES)) {
-                    let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
-                    for (i, pixel) in pixels.iter().enumerate() {
-                        x[i] = f64::from(pixel % width) + 0.5;
-                        y[i] = f64::from(pixel / width) + 0.5;
-                    }
-                    let seen = spans.nearest(&sight.rays([&x, &y]));
-                    out.iter_mut().zip(seen.depth).for_each(|(out, d)| *out = d as f32);
-                }
-            },
-        );
-        out
-    }
-}
-
 #[cfg(test)]
 #[path = "frame_tests.rs"]
 mod tests;

@@ -3,7 +3,7 @@
 
 use super::area::Area;
 use super::components::components;
-use super::picture::Picture;
+use super::features::PictureFeatures;
 use super::pixels::Pixels;
 use pcadlang_numerics::num::simd::vectorised;
 
@@ -83,7 +83,7 @@ fn nearest(lists: &[[f32; BLOCK]; COORDINATES], centres: &[Point]) -> [u32; BLOC
 
 /// Returns the coordinates, scaled by weights, of all pixels and of the pixels on a grid
 /// that clusters are fitted to.
-fn points(picture: &Picture, [place, texture]: [f32; 2]) -> (Points, Points) {
+fn points(picture: &PictureFeatures, [place, texture]: [f32; 2]) -> (Points, Points) {
     let (w, h) = (picture.width, picture.height);
     let unit = place / w.max(h) as f32;
     let point = |p: usize| {
@@ -199,7 +199,7 @@ impl Means {
 
 /// Returns the components of clusters that have at least `least` pixels, with weights of
 /// position and variation.
-pub fn regions(picture: &Picture, weights: [f32; 2], least: usize) -> Vec<Area> {
+pub fn regions(picture: &PictureFeatures, weights: [f32; 2], least: usize) -> Vec<Area> {
     let (w, h) = (picture.width, picture.height);
     let mut out = Vec::new();
     let (all, some) = points(picture, weights);
@@ -220,7 +220,7 @@ pub fn regions(picture: &Picture, weights: [f32; 2], least: usize) -> Vec<Area> 
 }
 
 /// Assigns every pixel a letter below [`LETTERS`] by colour and texture.
-pub fn codebook(picture: &Picture) -> Vec<u8> {
+pub fn codebook(picture: &PictureFeatures) -> Vec<u8> {
     let (all, some) = points(picture, [0.0, 1.0]);
     let mut means = Means::new(some);
     while means.centres.len() < LETTERS && means.split() {}

@@ -6,7 +6,7 @@
 
 use super::area::{Area, largest};
 use super::clusters::LETTERS;
-use super::picture::Picture;
+use super::features::PictureFeatures;
 
 /// Number of times colours are learned, and sweeps of mean field after each time.
 const ESTIMATES: usize = 3;
@@ -31,7 +31,7 @@ pub struct Field {
 
 impl Field {
     /// Builds the field of a picture with these letters.
-    pub fn new(picture: &Picture, codewords: Vec<u8>) -> Field {
+    pub fn new(picture: &PictureFeatures, codewords: Vec<u8>) -> Field {
         let (w, h) = (picture.width, picture.height);
         let squared = |p: usize, q: usize| {
             let (a, b) = (picture.lab[p], picture.lab[q]);

@@ -1,7 +1,7 @@
 //! Segments by minimum spanning forests (Felzenszwalb & Huttenlocher 2004, "Efficient
 //! graph-based image segmentation", IJCV 59, 167-181).
 
-use super::picture::Picture;
+use super::features::PictureFeatures;
 
 /// Pairs of 8-connected pixels with the distance of their colours, nearest first.
 pub struct Edges {
@@ -11,7 +11,7 @@ pub struct Edges {
 
 impl Edges {
     /// Returns the pairs of a picture, with smoothed colours.
-    pub fn of(picture: &Picture) -> Edges {
+    pub fn of(picture: &PictureFeatures) -> Edges {
         let (w, h) = (picture.width, picture.height);
         let mut edges = Vec::with_capacity(4 * w * h);
         for p in 0..w * h {

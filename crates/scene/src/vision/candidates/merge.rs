@@ -3,7 +3,7 @@
 //! search for object recognition", IJCV 104, 154-171, section 3).
 
 use super::area::Area;
-use super::picture::Picture;
+use super::features::PictureFeatures;
 use super::pixels::Pixels;
 
 /// Number of bins of each of L*, a* and b*.
@@ -71,7 +71,7 @@ impl Region {
 }
 
 /// Returns the segments of a picture as regions.
-fn regions(picture: &Picture, labels: &[u32], count: usize) -> Vec<Region> {
+fn regions(picture: &PictureFeatures, labels: &[u32], count: usize) -> Vec<Region> {
     let empty = Region {
         size: 0.0,
         bounds: [picture.width, picture.height, 0, 0],
@@ -108,7 +108,7 @@ fn texture(x: f32, y: f32) -> usize {
 }
 
 /// Returns neighbouring segments, in the order of their numbers.
-fn pairs(picture: &Picture, labels: &[u32]) -> Vec<Pair> {
+fn pairs(picture: &PictureFeatures, labels: &[u32]) -> Vec<Pair> {
     let (w, h) = (picture.width, picture.height);
     let mut borders = Vec::new();
     for p in 0..w * h {
@@ -132,7 +132,7 @@ fn pairs(picture: &Picture, labels: &[u32]) -> Vec<Pair> {
 }
 
 /// Returns the similarity of two neighbours.
-fn alike(picture: &Picture, rule: Rule, all: &[Region], pair: &Pair) -> f32 {
+fn alike(picture: &PictureFeatures, rule: Rule, all: &[Region], pair: &Pair) -> f32 {
     let (a, b) = (&all[pair.a], &all[pair.b]);
     let colour = common(&a.colour, &b.colour);
     let pixels = picture.pixels() as f32;
@@ -160,7 +160,7 @@ fn alike(picture: &Picture, rule: Rule, all: &[Region], pair: &Pair) -> f32 {
 /// Returns every region of the hierarchy over some segments that has `least` to `most`
 /// pixels.
 pub fn merge(
-    picture: &Picture,
+    picture: &PictureFeatures,
     (labels, count): &(Vec<u32>, usize),
     rule: Rule,
     least: usize,

@@ -14,10 +14,10 @@ mod clusters;
 mod components;
 mod cut;
 mod enclosed;
+mod features;
 mod felzenszwalb;
 mod merge;
 mod mirror;
-mod picture;
 mod pixels;
 mod profile;
 mod rim;
@@ -29,10 +29,10 @@ use crate::vision::{Mask, Photo};
 use area::Area;
 use cut::Field;
 pub use enclosed::enclosed;
+use features::PictureFeatures;
 use felzenszwalb::{Edges, felzenszwalb};
 use merge::{Rule, merge};
 use pcadlang_numerics::platform::threads::map_side_by_side;
-use picture::Picture;
 use pixels::Pixels;
 pub use rim::tilts;
 use score::{Scored, Scorer, suppressed};
@@ -96,7 +96,7 @@ pub struct Candidate {
 
 /// Returns the candidates of a photograph, the best first.
 pub fn candidates(photo: &Photo, options: &CandidateOptions) -> Vec<Candidate> {
-    let picture = Picture::of(photo, options.size.clamp(16, 1024));
+    let picture = PictureFeatures::of(photo, options.size.clamp(16, 1024));
     let (width, height) = (f64::from(photo.width()), f64::from(photo.height()));
     let scale = [width / picture.width as f64, height / picture.height as f64];
     let edges = rim::Edges { gradient: &picture.gradient, strong: picture.strong };
@@ -119,7 +119,7 @@ impl Candidate {
 }
 
 /// Returns the best regions with their scores.
-fn found(picture: &Picture, most: usize) -> Vec<Scored> {
+fn found(picture: &PictureFeatures, most: usize) -> Vec<Scored> {
     let field = Field::new(picture, clusters::codebook(picture));
     let scorer = Scorer::new(picture, &field.codewords);
     let bounded = |area: Area| Scored::bounded(scorer.bound(&area), area);
@@ -150,8 +150,8 @@ fn wholes(parts: &[Scored]) -> Vec<Area> {
     out
 }
 
-/// What regions are made from.
-enum Source<'a> {
+/// The ways of making regions.
+enum RegionMethod<'a> {
     /// Segments that are merged.
     Segments(&'a (Vec<u32>, usize), Rule),
     /// Clusters of colours, with these weights of position and variation.
@@ -159,18 +159,19 @@ enum Source<'a> {
 }
 
 /// Returns all regions from segments and clusters, without holes.
-fn regions(picture: &Picture) -> Vec<Area> {
+fn regions(picture: &PictureFeatures) -> Vec<Area> {
     let part = |p: f64| (p * picture.pixels() as f64).ceil() as usize;
     let (least, most) = (part(LEAST), part(MOST));
     let edges = Edges::of(picture);
     let segments = [(20.0, 25), (60.0, 40)].map(|(k, smallest)| felzenszwalb(&edges, k, smallest));
     let rules = [Rule::Likeness, Rule::Edges];
-    let merges = segments.iter().flat_map(|s| rules.map(|rule| Source::Segments(s, rule)));
-    let sources: Vec<Source> = merges.chain(clusters::WEIGHTS.map(Source::Colours)).collect();
-    let out = map_side_by_side(&sources, |source| {
-        let areas = match source {
-            Source::Segments(segments, rule) => merge(picture, segments, *rule, least, most),
-            Source::Colours(weights) => clusters::regions(picture, *weights, least),
+    let merges = segments.iter().flat_map(|s| rules.map(|rule| RegionMethod::Segments(s, rule)));
+    let methods: Vec<RegionMethod> =
+        merges.chain(clusters::WEIGHTS.map(RegionMethod::Colours)).collect();
+    let out = map_side_by_side(&methods, |method| {
+        let areas = match method {
+            RegionMethod::Segments(segments, rule) => merge(picture, segments, *rule, least, most),
+            RegionMethod::Colours(weights) => clusters::regions(picture, *weights, least),
         };
         let filled = areas.into_iter().map(Area::filled);
         filled.filter(|a| a.count <= most).collect::<Vec<_>>()

@@ -2,8 +2,8 @@
 
 use super::area::Area;
 use super::clusters::LETTERS;
+use super::features::PictureFeatures;
 use super::mirror::symmetry;
-use super::picture::Picture;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -19,7 +19,7 @@ pub struct Scorer<'a> {
 
 impl Scorer<'_> {
     /// Prepares a picture with its letters.
-    pub fn new<'a>(picture: &Picture, codewords: &'a [u8]) -> Scorer<'a> {
+    pub fn new<'a>(picture: &PictureFeatures, codewords: &'a [u8]) -> Scorer<'a> {
         let (w, h) = (picture.width, picture.height);
         let most = |p: usize| {
             let (i, j) = (p % w, p / w);

@@ -222,7 +222,7 @@ fn segments_and_regions_of_plain_colours() {
         _ => [40, 60, 160],
     };
     let photo = Photo::from_rgb(RgbImage::from_fn(64, 64, |i, j| Rgb(colour(i, j)))).unwrap();
-    let picture = Picture::of(&photo, 64);
+    let picture = PictureFeatures::of(&photo, 64);
     let segments = felzenszwalb(&Edges::of(&picture), 20.0, 25);
     let at = |i: usize, j: usize| segments.0[j * 64 + i];
     assert!(at(24, 30) != at(40, 30) && at(24, 30) != at(5, 5));
@@ -242,7 +242,7 @@ fn segments_and_regions_of_plain_colours() {
 #[test]
 fn a_cut_moves_to_the_object() {
     let (photo, truth) = vase(0.1);
-    let picture = Picture::of(&photo, 128);
+    let picture = PictureFeatures::of(&photo, 128);
     let truth = truth.resized(picture.width as u32, picture.height as u32);
     let truth = pixels_where(picture.width, picture.height, |p| truth.data()[p]).unwrap();
     // Its shape, shifted slightly.

@@ -2,13 +2,11 @@
 //! `crates/contour_detectors`, can replace it through the trait.
 
 use crate::vision::VisionError;
-use crate::vision::detect::gradient::colour_gradient;
-use crate::vision::detect::nms::{EdgePoint, hysteresis, suppress};
+use crate::vision::detect::gradient::{EdgePoint, colour_gradient, hysteresis, suppress};
 use crate::vision::detect::soft_map::SoftMap;
 use crate::vision::pictures::color::linear_to_labs;
 use crate::vision::pictures::contour_map::ContourMap;
-use crate::vision::pictures::photo::Photo;
-use crate::vision::pictures::resize::fitted;
+use crate::vision::pictures::photo::{Photo, fitted};
 use std::fmt::Debug;
 
 /// The default longer side of the picture that a [`ContourDetector`] works on, pixels.

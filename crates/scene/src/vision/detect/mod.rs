@@ -2,6 +2,5 @@
 
 pub mod detector;
 pub mod gradient;
-pub mod nms;
 pub mod soft_map;
 pub(in crate::vision) mod thin;

@@ -2,11 +2,9 @@
 //! them: along the ridges of a map of contours, or around the regions in a map of
 //! objects.
 
-use crate::vision::detect::gradient::{Gradient, colour_gradient, smoothed};
-use crate::vision::detect::nms::{EdgePoint, suppress};
+use crate::vision::detect::gradient::{EdgePoint, Gradient, colour_gradient, smoothed, suppress};
 use crate::vision::pictures::contour_map::ContourMap;
-use crate::vision::pictures::photo::Photo;
-use crate::vision::pictures::resize::fitted;
+use crate::vision::pictures::photo::{Photo, fitted};
 
 /// What a map shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -23,10 +23,8 @@
 //! `"width"` and `"height"`, beside `"keypoints"` or in COCO's `"images"`, give the size
 //! of the image in whose pixels the positions are.
 
-mod error;
 mod layouts;
 mod likelihood;
-mod matching;
 mod names;
 mod node;
 mod people;
@@ -35,10 +33,9 @@ mod relative_depth;
 #[cfg(test)]
 mod calibration_tests;
 
-pub use error::KeypointsError;
 pub use likelihood::{Detection, DetectionConstants, KeypointLikelihood, KeypointOptions, Unit};
-pub use matching::matching;
-pub use names::{COCO, MEDIAPIPE};
+pub use names::{COCO, MEDIAPIPE, matching};
+pub use node::KeypointsError;
 pub use people::{People, split_id};
 pub use relative_depth::RelativeDepthLikelihood;
 

@@ -1,6 +1,6 @@
 //! The people in a file, and the choice of one of them.
 
-use super::error::first;
+use super::node::first;
 use super::{Keypoints, KeypointsError};
 
 /// The people of a file, in the order of the file.

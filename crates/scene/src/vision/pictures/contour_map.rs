@@ -2,8 +2,7 @@
 //! and the input of comparators.
 
 use crate::contours::ContourSlice;
-use crate::vision::detect::gradient::{principal, smoothed};
-use crate::vision::detect::nms::{EdgePoint, ridge_offset};
+use crate::vision::detect::gradient::{EdgePoint, principal, ridge_offset, smoothed};
 use crate::vision::detect::thin::thinned;
 use crate::vision::pictures::photo::Photo;
 use image::{DynamicImage, GrayImage, Luma};

@@ -2,7 +2,5 @@
 
 pub mod color;
 pub mod contour_map;
-pub mod exif;
 pub mod npy;
 pub mod photo;
-pub mod resize;

@@ -2,8 +2,7 @@
 //! and float64, uint8 and bool, in C order. `.npz` archives, other types and Fortran
 //! order are rejected with a message that says what to do; float32 is written too.
 
-use crate::vision::error::{VisionError, read_bytes};
-use std::path::Path;
+use crate::vision::error::VisionError;
 
 /// The numbers of an array.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,11 +56,6 @@ impl NpyArray {
 
 fn bad(text: impl Into<String>) -> VisionError {
     VisionError::Npy(text.into())
-}
-
-/// Reads a file of at most `max_bytes` bytes.
-pub fn load(path: &Path, max_bytes: u64) -> Result<NpyArray, VisionError> {
-    parse(&read_bytes(path, max_bytes)?).map_err(|e| e.in_file(path))
 }
 
 /// Whether bytes begin with the magic number of a `.npy` file.
@@ -261,10 +255,6 @@ mod tests {
         assert!(message(&bytes_of(9, "<f4", "False", "(2,)", &[0; 8])).contains("version 9"));
         let flat = parse(&good).unwrap();
         assert!(flat.picture_size().unwrap_err().to_string().contains("two axes"));
-        assert!(matches!(
-            load(Path::new("no/such.npy"), 9).unwrap_err().cause(),
-            VisionError::Missing
-        ));
     }
 
     #[test]

@@ -3,12 +3,10 @@
 //! is upright (Exif orientation applied), is opaque (alpha composited over white in sRGB
 //! values, as viewers do) and has at least one pixel.
 
-use crate::vision::error::{VisionError, read_bytes};
-use crate::vision::pictures::color::{linear_table, linear_to_srgb};
-use crate::vision::{exif, resize};
+use crate::vision::error::VisionError;
+use crate::vision::pictures::color::{linear_table, linear_to_byte, linear_to_srgb};
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, RgbImage};
 use std::io::Cursor;
-use std::path::Path;
 
 /// Limits on the size of a picture. The size in the header is checked before memory is
 /// allocated for pixels.
@@ -41,9 +39,9 @@ impl Limits {
         Ok(())
     }
 
-    /// The maximum number of bytes of a file: 16 per pixel, more than any supported
-    /// format needs uncompressed.
-    pub(crate) fn max_bytes(&self) -> u64 {
+    /// The maximum number of bytes to decode: 16 per pixel, more than any supported format
+    /// needs uncompressed.
+    fn max_bytes(&self) -> u64 {
         self.max_pixels.saturating_mul(16).saturating_add(1 << 20)
     }
 }
@@ -99,7 +97,7 @@ impl Photo {
         let table = linear_table();
         let stride = 3 * self.rgb.width() as usize;
         let bytes = self.rgb.as_raw();
-        let rgb = resize::resize_rows(self.rgb.dimensions(), (width, height), |j, row| {
+        let rgb = resize_rows(self.rgb.dimensions(), (width, height), |j, row| {
             let pixels = bytes.chunks_exact(stride).nth(j as usize).unwrap_or_default();
             for (p, b) in row.iter_mut().zip(pixels.chunks_exact(3)) {
                 *p = [table[usize::from(b[0])], table[usize::from(b[1])], table[usize::from(b[2])]];
@@ -134,22 +132,17 @@ impl Photo {
     /// Returns the photo shrunk, in linear light, to a longer side of at most `longer`
     /// pixels; unchanged if it is smaller.
     pub fn shrunk(&self, longer: u32) -> Photo {
-        let (width, height) = resize::fitted(self.width(), self.height(), longer);
+        let (width, height) = fitted(self.width(), self.height(), longer);
         if (width, height) == self.rgb.dimensions() {
             return self.clone();
         }
         let linear = self.linear(width, height);
         let mut rgb = RgbImage::new(width, height);
         for (p, v) in rgb.pixels_mut().zip(&linear.rgb) {
-            p.0 = v.map(crate::vision::pictures::color::linear_to_byte);
+            p.0 = v.map(linear_to_byte);
         }
         Photo { rgb, focal_35mm: self.focal_35mm }
     }
-}
-
-/// Reads a photograph from a PNG or JPEG file.
-pub fn load(path: &Path, limits: &Limits) -> Result<Photo, VisionError> {
-    decode(&read_bytes(path, limits.max_bytes())?, limits).map_err(|e| e.in_file(path))
 }
 
 /// Reads a photograph from the bytes of a PNG or JPEG file.
@@ -183,7 +176,7 @@ pub(crate) fn decode_dynamic(
     }
     // Damaged metadata count as missing.
     let orientation = decoder.orientation().unwrap_or(image::metadata::Orientation::NoTransforms);
-    let focal = decoder.exif_metadata().ok().flatten().and_then(|chunk| exif::focal_35mm(&chunk));
+    let focal = decoder.exif_metadata().ok().flatten().and_then(|chunk| focal_35mm(&chunk));
     let mut picture = DynamicImage::from_decoder(decoder).map_err(cause)?;
     picture.apply_orientation(orientation);
     Ok((picture, focal))
@@ -286,6 +279,134 @@ fn over_white(picture: DynamicImage) -> RgbImage {
         }
         other => other.into_rgb8(),
     }
+}
+
+// The one piece of metadata that helps to place the camera: the 35 mm equivalent focal length
+// (Exif 2.3, tag 0xA405). Damaged metadata count as missing: they never make a picture
+// unreadable.
+
+/// TIFF bytes with a byte order.
+struct Tiff<'a> {
+    bytes: &'a [u8],
+    big: bool,
+}
+
+impl Tiff<'_> {
+    fn u16(&self, at: usize) -> Option<u16> {
+        let b: [u8; 2] = self.bytes.get(at..at.checked_add(2)?)?.try_into().ok()?;
+        Some(if self.big { u16::from_be_bytes(b) } else { u16::from_le_bytes(b) })
+    }
+
+    fn u32(&self, at: usize) -> Option<u32> {
+        let b: [u8; 4] = self.bytes.get(at..at.checked_add(4)?)?.try_into().ok()?;
+        Some(if self.big { u32::from_be_bytes(b) } else { u32::from_le_bytes(b) })
+    }
+
+    /// Returns the value of a one-number entry (SHORT or LONG) of the directory at `at`.
+    fn entry(&self, at: usize, tag: u16) -> Option<u32> {
+        let count = usize::from(self.u16(at)?);
+        let found = (0..count).map(|i| at + 2 + 12 * i).find(|&e| self.u16(e) == Some(tag))?;
+        match self.u16(found + 2)? {
+            3 => self.u16(found + 8).map(u32::from),
+            4 => self.u32(found + 8),
+            _ => None,
+        }
+    }
+}
+
+/// Returns the 35 mm equivalent focal length in mm of an Exif chunk (a TIFF structure),
+/// if present.
+fn focal_35mm(chunk: &[u8]) -> Option<f64> {
+    let chunk = chunk.strip_prefix(b"Exif\0\0").unwrap_or(chunk);
+    let big = match chunk.get(..4)? {
+        b"MM\0\x2a" => true,
+        b"II\x2a\0" => false,
+        _ => return None,
+    };
+    let tiff = Tiff { bytes: chunk, big };
+    let exif = tiff.entry(tiff.u32(4)? as usize, 0x8769)?;
+    match tiff.entry(exif as usize, 0xA405)? {
+        0 => None,
+        mm => Some(f64::from(mm)),
+    }
+}
+
+// Area-averaged resizing: every target pixel is the mean of the source over the rectangle it
+// covers, so the overall mean is preserved. It is not meant for enlarging: enlarged pixels
+// become blocks.
+
+/// The source pixels `first..` that each target pixel covers along one axis, with weights
+/// that sum to 1.
+fn spans(from: u32, to: u32) -> Vec<(usize, Vec<f64>)> {
+    let ratio = f64::from(from) / f64::from(to);
+    (0..to)
+        .map(|i| {
+            // Span ends are exact where they fall on pixel borders.
+            let end = |k: u32| (u64::from(k) * u64::from(from)) as f64 / f64::from(to);
+            let (a, b) = (end(i), end(i + 1));
+            let first = a.floor() as usize;
+            let last = (b.ceil() as usize).clamp(first + 1, from as usize);
+            let weights = (first..last)
+                .map(|s| ((b.min((s + 1) as f64) - a.max(s as f64)) / ratio).max(0.0))
+                .collect();
+            (first, weights)
+        })
+        .collect()
+}
+
+/// Resizes a picture by area averaging, reading its rows on demand: `row(j, buffer)`
+/// fills row `j` (of `width` pixels). A side of 0 gives an empty picture.
+pub fn resize_rows<const N: usize>(
+    (width, height): (u32, u32),
+    (to_width, to_height): (u32, u32),
+    mut row: impl FnMut(u32, &mut [[f32; N]]),
+) -> Vec<[f32; N]> {
+    if width == 0 || height == 0 || to_width == 0 || to_height == 0 {
+        return Vec::new();
+    }
+    let columns = spans(width, to_width);
+    let mut source = vec![[0.0f32; N]; width as usize];
+    let mut narrow = vec![[0.0f64; N]; to_width as usize];
+    let mut read = None;
+    let mut out = Vec::with_capacity(to_width as usize * to_height as usize);
+    for (first, weights) in spans(height, to_height) {
+        let mut sum = vec![[0.0f64; N]; to_width as usize];
+        for (k, &wy) in weights.iter().enumerate() {
+            if read != Some(first + k) {
+                row((first + k) as u32, &mut source);
+                read = Some(first + k);
+                for (n, (x0, wx)) in narrow.iter_mut().zip(&columns) {
+                    *n = [0.0; N];
+                    for (p, w) in source.iter().skip(*x0).zip(wx) {
+                        for c in 0..N {
+                            n[c] += w * f64::from(p[c]);
+                        }
+                    }
+                }
+            }
+            for (s, n) in sum.iter_mut().zip(&narrow) {
+                for c in 0..N {
+                    s[c] += wy * n[c];
+                }
+            }
+        }
+        out.extend(sum.into_iter().map(|s| s.map(|v| v as f32)));
+    }
+    out
+}
+
+/// Returns the size with the same aspect ratio whose longer side is at most `longer` (at
+/// least 1); never larger than the original.
+pub fn fitted(width: u32, height: u32, longer: u32) -> (u32, u32) {
+    let (side, longer) = (width.max(height), longer.max(1));
+    if side <= longer {
+        return (width, height);
+    }
+    let scale = |v: u32| {
+        ((u64::from(v) * u64::from(longer) + u64::from(side) / 2) / u64::from(side))
+            .clamp(1, u64::from(longer)) as u32
+    };
+    (scale(width), scale(height))
 }
 
 #[cfg(test)]

@@ -103,7 +103,7 @@ fn orientation_and_focal_length() {
         RgbImage::from_fn(32, 16, |i, _| if i < 16 { Rgb([255, 0, 0]) } else { Rgb([0, 0, 255]) });
     let jpeg = encoded(rgb, ImageFormat::Jpeg);
     let with = |orientation| {
-        let body = [b"Exif\0\0".as_slice(), &exif::chunk(orientation, 28)].concat();
+        let body = [b"Exif\0\0".as_slice(), &exif_chunk(orientation, 28)].concat();
         let length = (body.len() as u16 + 2).to_be_bytes();
         [&jpeg[..2], &[0xff, 0xe1], &length, &body, &jpeg[2..]].concat()
     };
@@ -175,25 +175,10 @@ fn size_is_checked_before_pixels() {
 }
 
 #[test]
-fn files() {
-    let folder = std::env::temp_dir().join(format!("pcadlang-photo-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
-    let missing = load(&folder.join("none.png"), &Limits::default()).unwrap_err();
-    assert!(matches!(missing.cause(), VisionError::Missing));
-    assert!(missing.to_string().contains("none.png"));
-    let write = |name: &str, bytes: &[u8]| {
-        std::fs::write(folder.join(name), bytes).unwrap();
-        load(&folder.join(name), &Limits::default())
-    };
-    assert!(matches!(write("empty.png", b"").unwrap_err().cause(), VisionError::Empty));
-    assert!(matches!(
-        write("text.png", b"some text").unwrap_err().cause(),
-        VisionError::NotAnImage(_)
-    ));
-    // The content decides, not the name.
-    assert!(write("really_a_jpeg.png", &encoded(colours(8, 8), ImageFormat::Jpeg)).is_ok());
-    assert!(load(&folder, &Limits::default()).is_err());
-    std::fs::remove_dir_all(&folder).unwrap();
+fn the_content_decides_and_not_the_name() {
+    assert!(matches!(read(b"").unwrap_err(), VisionError::Empty));
+    assert!(matches!(read(b"some text").unwrap_err(), VisionError::NotAnImage(_)));
+    assert!(read(&encoded(colours(8, 8), ImageFormat::Jpeg)).is_ok());
 }
 
 #[test]
@@ -207,4 +192,89 @@ fn shrinking_is_in_linear_light() {
     assert_eq!(stripes.shrunk(64), stripes);
     assert_eq!(stripes.linear(1, 1).rgb.len(), 1);
     assert!(Photo::from_rgb(RgbImage::new(0, 3)).is_err());
+}
+
+/// A little-endian Exif chunk with an orientation and a focal length, for tests.
+fn exif_chunk(orientation: u16, focal: u16) -> Vec<u8> {
+    let mut out = b"II\x2a\0\x08\0\0\0".to_vec();
+    let entry = |out: &mut Vec<u8>, tag: u16, kind: u16, value: u32| {
+        out.extend(tag.to_le_bytes());
+        out.extend(kind.to_le_bytes());
+        out.extend(1u32.to_le_bytes());
+        out.extend(value.to_le_bytes());
+    };
+    out.extend(2u16.to_le_bytes());
+    entry(&mut out, 0x0112, 3, u32::from(orientation));
+    entry(&mut out, 0x8769, 4, 38);
+    out.extend([0; 4]);
+    out.extend(1u16.to_le_bytes());
+    entry(&mut out, 0xA405, 3, u32::from(focal));
+    out.extend([0; 4]);
+    out
+}
+
+#[test]
+fn focal_length_is_found() {
+    assert_eq!(focal_35mm(&exif_chunk(1, 28)), Some(28.0));
+    assert_eq!(focal_35mm(&[b"Exif\0\0".as_slice(), &exif_chunk(1, 50)].concat()), Some(50.0));
+    assert_eq!(focal_35mm(&exif_chunk(1, 0)), None);
+}
+
+#[test]
+fn damaged_chunks_are_none() {
+    let good = exif_chunk(6, 35);
+    for n in 0..good.len() - 4 {
+        // The last four bytes (next directory) are not needed; the value ends right
+        // before them.
+        let cut = focal_35mm(&good[..n]);
+        assert!(cut.is_none() || n >= good.len() - 6, "{n}");
+    }
+    let mut wild = good;
+    wild[4..8].copy_from_slice(&u32::MAX.to_le_bytes());
+    assert_eq!(focal_35mm(&wild), None);
+}
+
+fn resize(w: u32, h: u32, data: &[f32], to: (u32, u32)) -> Vec<f32> {
+    resize_rows((w, h), to, |j, row| {
+        for (p, v) in row.iter_mut().zip(&data[(j * w) as usize..]) {
+            *p = [*v];
+        }
+    })
+    .into_iter()
+    .map(|[v]| v)
+    .collect()
+}
+
+#[test]
+fn same_size_is_a_copy() {
+    let data: Vec<f32> = (0..35).map(|i| (i * 7 % 11) as f32 / 3.0).collect();
+    assert_eq!(resize(7, 5, &data, (7, 5)), data);
+}
+
+#[test]
+fn halves_average_blocks_and_fractions_are_weighted() {
+    assert_eq!(resize(4, 2, &[1.0, 3.0, 5.0, 7.0, 1.0, 3.0, 5.0, 7.0], (2, 1)), [2.0, 6.0]);
+    // 3 -> 2: a target pixel is one pixel and half of the next.
+    let out = resize(3, 1, &[0.0, 3.0, 6.0], (2, 1));
+    assert!((out[0] - 1.0).abs() < 1e-6 && (out[1] - 5.0).abs() < 1e-6, "{out:?}");
+}
+
+#[test]
+fn the_mean_is_kept() {
+    let data: Vec<f32> = (0..31 * 17).map(|i| ((i * 37) % 101) as f32).collect();
+    let mean = |v: &[f32]| v.iter().map(|&x| f64::from(x)).sum::<f64>() / v.len() as f64;
+    for to in [(7, 5), (31, 3), (1, 1), (50, 40), (13, 17)] {
+        let out = resize(31, 17, &data, to);
+        assert_eq!(out.len(), (to.0 * to.1) as usize);
+        assert!((mean(&out) - mean(&data)).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn fitted_sizes() {
+    assert_eq!(fitted(4000, 3000, 256), (256, 192));
+    assert_eq!(fitted(100, 50, 256), (100, 50));
+    assert_eq!(fitted(16384, 1, 256), (256, 1));
+    assert_eq!(fitted(5, 9, 0), (1, 1));
+    assert!(resize(3, 1, &[1.0; 3], (0, 4)).is_empty());
 }

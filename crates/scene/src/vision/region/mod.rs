@@ -174,14 +174,6 @@ impl Region {
         self.colours
     }
 
-    /// Returns the weighted log-probability of the colours if everything is background, a
-    /// constant of the picture. Added to [`Region::log_likelihood`] it gives the
-    /// log-probability itself (without shading).
-    pub fn log_background(&self) -> f64 {
-        self.options.power * self.empty
-            + self.options.by_tile() * self.empty_tiles.iter().sum::<f64>()
-    }
-
     /// Returns the weighted log ratio of the picture's colours, and of its shading if
     /// scored, relative to a picture that is all background. `groups` has a number for
     /// each pixel in row-major order: 0 is background, and each other group has its own

@@ -4,10 +4,15 @@
 use super::*;
 use pcadlang_numerics::rng::{Purpose, StreamKey};
 
-/// What counts a picture's groups and normals.
-
 const GLOBAL: RegionOptions =
     RegionOptions { power: 1.0, tiles: 0, tile_power: 0.0, colours: 4, prior: 0.5, shading: 0.0 };
+
+/// The weighted log-probability of the colours if everything is background. Added to the
+/// log-likelihood it gives the log-probability itself (without shading).
+fn log_background(region: &Region) -> f64 {
+    region.options.power * region.empty
+        + region.options.by_tile() * region.empty_tiles.iter().sum::<f64>()
+}
 
 fn stream(step: u64) -> Stream {
     StreamKey::new(11, 0, Purpose::PREDICT).stream(step, 0, 0)
@@ -54,7 +59,7 @@ fn agrees_with_one_pixel_after_another() {
             let o = RegionOptions { power, tiles, tile_power, ..GLOBAL };
             let region = Region::of(&picture, &o).unwrap();
             let groups = random(n, most, 100 + step as u64);
-            let (got, background) = (region.log_likelihood(&groups, &[]), region.log_background());
+            let (got, background) = (region.log_likelihood(&groups, &[]), log_background(&region));
             let expected = reference(&labels, &groups, (w, h), 5, &o);
             assert!(
                 (got + background - expected).abs() < 1e-9 * expected.abs().max(1.0),
@@ -86,7 +91,7 @@ fn probabilities_of_all_pictures_sum_to_one() {
         for code in 0..colours.pow(6) {
             let labels = (0..6).map(|i| (code / colours.pow(i) % colours) as u8).collect();
             let region = Region::of(&Quantised::new(3, 2, colours, labels).unwrap(), &o).unwrap();
-            sum += libm::exp(region.log_likelihood(&groups, &[]) + region.log_background());
+            sum += libm::exp(region.log_likelihood(&groups, &[]) + log_background(&region));
         }
         assert!((sum - 1.0).abs() < 1e-12, "{sum}");
     }
@@ -109,7 +114,7 @@ fn draws_have_the_probabilities_that_are_scored() {
             let labels = (0..4).rev().map(|i| (code >> i & 1) as u8).collect();
             let region = Region::of(&Quantised::new(4, 1, 2, labels).unwrap(), &o).unwrap();
             let expected = f64::from(n)
-                * libm::exp(region.log_likelihood(&groups, &[]) + region.log_background());
+                * libm::exp(region.log_likelihood(&groups, &[]) + log_background(&region));
             chi2 += (seen - expected) * (seen - expected) / expected;
         }
         // 15 degrees of freedom: exceeded with probability 0.001.

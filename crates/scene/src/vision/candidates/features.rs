@@ -1,4 +1,4 @@
-//! A small picture for the search for candidates: colours in CIE L*a*b*, local variation
+//! What the search for candidates reads of a small picture: colours in CIE L*a*b*, local variation
 //! of lightness, and gradients.
 
 use crate::vision::Photo;
@@ -14,7 +14,7 @@ const AROUND: f32 = 2.0;
 const STRONG: f64 = 0.97;
 
 /// A picture at the working resolution; lists are in row-major order.
-pub struct Picture {
+pub struct PictureFeatures {
     pub width: usize,
     pub height: usize,
     /// L*, a* and b*.
@@ -31,9 +31,9 @@ pub struct Picture {
     pub strong: f32,
 }
 
-impl Picture {
+impl PictureFeatures {
     /// Prepares a photo with a longer side of at most `size` pixels.
-    pub fn of(photo: &Photo, size: u32) -> Picture {
+    pub fn of(photo: &Photo, size: u32) -> PictureFeatures {
         let photo = photo.shrunk(size);
         let (width, height) = (photo.width(), photo.height());
         let lab = linear_to_labs(&photo.linear(width, height).rgb);
@@ -45,7 +45,7 @@ impl Picture {
         sorted.sort_by(f32::total_cmp);
         let strong =
             sorted.get((STRONG * sorted.len() as f64) as usize).map_or(1.0, |g| g.max(1.0));
-        Picture {
+        PictureFeatures {
             width: width as usize,
             height: height as usize,
             smooth,
