@@ -12,8 +12,7 @@ use pcadlang_engine::trace::{Address, Change, Draws, Given, Target};
 use pcadlang_inference::StepContext;
 use pcadlang_library::scene::ImageValue;
 use pcadlang_numerics::rng::{Purpose, StreamKey};
-use pcadlang_workbench::bank;
-use pcadlang_workbench::session::observed_image;
+use pcadlang_workbench::session::{self, observed_image};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -470,8 +469,8 @@ impl Trace {
         let draws = predictive(self.seed);
         let trace = self.change()?;
         let view = py.detach(|| match name {
-            Some(name) => trace.global(name, draws)?.ok().and_then(|v| bank::as_view(&v, None)),
-            None => bank::view(trace, draws, None),
+            Some(name) => trace.global(name, draws)?.ok().and_then(|v| session::as_view(&v, None)),
+            None => session::view(trace, draws, None),
         });
         view.map(View::new).ok_or_else(|| {
             plain(match name {

@@ -11,7 +11,8 @@ use pcadlang_scene::render::Contours;
 use pcadlang_scene::vision::ContourMap;
 use pcadlang_scene::vision::features::Query;
 use pcadlang_scene::vision::keypoints::{Keypoint, Keypoints};
-use pcadlang_workbench::bank::{Bank, BankError, Features, Observed, as_view};
+use pcadlang_workbench::bank::{Bank, BankError, Features, Observed};
+use pcadlang_workbench::session::as_view;
 use std::sync::Arc;
 
 /// A lathed solid, with or without a waist.

@@ -8,7 +8,7 @@ use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::Draws;
 use pcadlang_library::standard;
 use pcadlang_syntax::format;
-use pcadlang_workbench::bank::as_view;
+use pcadlang_workbench::session::as_view;
 
 /// Writes the files that examples read.
 fn files() -> Folder {

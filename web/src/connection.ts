@@ -1,4 +1,5 @@
-// One WebSocket to the program: requests with one answer each, events, and reconnection.
+// One WebSocket to the program: requests with one answer each, events, and reconnection; tasks of
+// which only the newest matters.
 
 import { readFrame, type BinaryAnswer, type Diagnostic, type Event } from "./protocol";
 
@@ -137,5 +138,37 @@ function uploadError(status: number, text: string): Refusal {
     return new Refusal(error?.message ?? message ?? text, error?.hint ?? hint ?? null);
   } catch {
     return new Refusal(text || `the photograph was refused (${status})`);
+  }
+}
+
+/** Runs a task one at a time; of the calls made meanwhile only the last one is run: what keeps
+ * dragging smooth however slow the program answers. */
+export class Latest<A> {
+  private running = false;
+  private next: { request: A } | null = null;
+
+  constructor(
+    private readonly task: (request: A) => Promise<void>,
+    private readonly onError: (error: unknown) => void = () => {},
+  ) {}
+
+  /** Asks for the task with a new request. */
+  call(request: A): void {
+    this.next = { request };
+    if (!this.running) void this.work();
+  }
+
+  private async work(): Promise<void> {
+    this.running = true;
+    while (this.next) {
+      const { request } = this.next;
+      this.next = null;
+      try {
+        await this.task(request);
+      } catch (error) {
+        this.onError(error);
+      }
+    }
+    this.running = false;
   }
 }

@@ -2,7 +2,7 @@
 
 import { inflate } from "./inflate";
 import type { Camera, Mesh } from "./protocol";
-import type { Frame, ImageUrl, ViewerData } from "./viewer_data";
+import type { Frame, ImageUrl, ViewerData } from "./viewer";
 
 /** A draw as the report holds it. */
 interface EmbeddedDraw {

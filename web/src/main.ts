@@ -2,7 +2,7 @@
 
 import "./style.css";
 import "uplot/dist/uPlot.min.css";
-import { Actions } from "./actions";
+import { Actions, Store } from "./actions";
 import { Connection } from "./connection";
 import { button, h } from "./dom";
 import { acceptDrops } from "./drop";
@@ -18,7 +18,6 @@ import { PromptPanel } from "./prompt_panel";
 import { RunsPanel } from "./runs_panel";
 import { ScenePanel } from "./scene_panel";
 import { splitter } from "./splitter";
-import { Store } from "./store";
 import { Tabs, type Tab } from "./tabs";
 import { TopBar } from "./top_bar";
 import { TracePanel } from "./trace_panel";
@@ -37,8 +36,6 @@ actions.onError = (error) => errors.show(error);
 const bar = new TopBar(actions);
 const program = new ProgramPanel(actions);
 const scene = new ScenePanel(actions);
-const trace = new TracePanel(actions);
-trace.onMoved = (coarse) => scene.follow(coarse);
 
 const programTab = h("div", { class: "panel program-tab" });
 const tabOf = (key: string, name: string, panel: Pick<Panel, "element" | "setVisible">): Tab => {
@@ -47,7 +44,7 @@ const tabOf = (key: string, name: string, panel: Pick<Panel, "element" | "setVis
 const tabs = new Tabs(
   [
     { key: "program", name: "Program", panel: programTab },
-    tabOf("trace", "Trace", trace),
+    tabOf("trace", "Trace", new TracePanel(actions)),
     tabOf("plots", "Plots", new PlotsPanel(actions)),
     tabOf("modes", "Modes", new ModesPanel(actions)),
     tabOf("prompt", "Prompt", new PromptPanel(actions)),

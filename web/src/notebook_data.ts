@@ -1,7 +1,7 @@
 // The data of a notebook's viewer: one solid, whose bytes the kernel sends.
 
 import type { Camera, Mesh } from "./protocol";
-import type { Frame, ImageUrl, ViewerData } from "./viewer_data";
+import type { Frame, ImageUrl, ViewerData } from "./viewer";
 
 /** The widget's model in the page, as anywidget gives it. */
 export interface WidgetModel {

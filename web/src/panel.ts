@@ -1,9 +1,8 @@
 // The common parts of the tabs that show the program's answers.
 
-import type { Actions } from "./actions";
+import type { Actions, Known } from "./actions";
+import { Latest } from "./connection";
 import { ErrorBox } from "./errors";
-import { Latest } from "./latest";
-import type { Known } from "./store";
 
 /** A tab that follows the store while it is in sight, and asks again only for what changed. */
 export abstract class Panel {

@@ -1,11 +1,10 @@
 // The picture of a frame in one of its layers, with the viewpoint it is rendered from.
 
-import { Disconnected } from "./connection";
+import { Disconnected, Latest } from "./connection";
 import { h, select, setOptions } from "./dom";
 import { ErrorBox } from "./errors";
-import { Latest } from "./latest";
-import type { Camera, Vec3 } from "./protocol";
-import { LAYERS, type ImageUrl, type ViewerData } from "./viewer_data";
+import { LAYERS, type Camera, type Vec3 } from "./protocol";
+import type { ImageUrl, ViewerData } from "./viewer";
 
 const VIEWPOINTS: [string, string][] = [
   ["given", "From the camera"],

@@ -1,9 +1,9 @@
 // The tab Prompt: lines entered into the session, and what it answers.
 
 import type { Actions } from "./actions";
+import { Latest } from "./connection";
 import { button, h } from "./dom";
 import { explain } from "./errors";
-import { Latest } from "./latest";
 import { askPicture } from "./studio_data";
 
 interface Completion {

@@ -214,6 +214,21 @@ export type Event =
   | { event: "session"; session: number; revision: number }
   | { event: "folder" };
 
+/** The layers of pictures, with their names. */
+export const LAYERS: [string, string][] = [
+  ["overlay", "Overlay"],
+  ["photo", "Photograph"],
+  ["scene", "Scene"],
+  ["depth", "Depth"],
+  ["normals", "Normals"],
+  ["regions", "Parts"],
+  ["contours", "Contours of the scene"],
+  ["photo_contours", "Contours of the photograph"],
+  ["residuals", "Residuals"],
+  ["joints", "Joints"],
+  ["mask", "Mask"],
+];
+
 /** A triangle mesh; meshes with the same topology have corresponding vertices. */
 export interface Mesh {
   topology: string;

@@ -1,11 +1,10 @@
 // The middle of the page: the viewer, and which states it shows.
 
-import type { Actions } from "./actions";
+import type { Actions, View } from "./actions";
 import { button, h, Segments, select } from "./dom";
 import { ErrorBox } from "./errors";
 import { hasBest } from "./protocol";
 import { StudioData } from "./studio_data";
-import type { View } from "./store";
 import { Viewer } from "./viewer";
 
 const VIEWS: [View, string][] = [
@@ -64,12 +63,14 @@ export class ScenePanel {
     this.viewer.element.querySelector(".viewer-head")!.append(this.exports);
     const keys = ["session", "runs", "run", "draws", "modes", "view", "at", "connected"] as const;
     store.on([...keys], () => this.show());
+    store.on(["moved"], () => this.follow());
     this.show();
   }
 
   /** A dragged choice was changed: coarse pictures follow it. */
-  follow(coarse: boolean): void {
-    if (this.actions.store.now.view === "session") this.viewer.refresh(coarse);
+  private follow(): void {
+    const { view, moved } = this.actions.store.now;
+    if (view === "session") this.viewer.refresh(moved.coarse);
   }
 
   private show(): void {

@@ -1,13 +1,13 @@
 // The 3D view with its controls: paint, ghosts, the photograph, the camera.
 
 import { viridisGradient } from "./colour_map";
+import { Latest } from "./connection";
 import { button, fill, h, number, select } from "./dom";
 import { ErrorBox } from "./errors";
-import { Latest } from "./latest";
 import type { Mesh } from "./protocol";
 import { Scene3D } from "./scene3d";
 import type { Paint } from "./scene_geometry";
-import type { ViewerData } from "./viewer_data";
+import type { ViewerData } from "./viewer";
 import { evenly, Spread } from "./uncertainty";
 
 const GHOSTS = 12;

@@ -3,11 +3,11 @@
 import type { Actions } from "./actions";
 import { buildTree, passes, visibleRows, type Node, type Row } from "./address_tree";
 import { button, fill, filterField, h, number } from "./dom";
-import { Latest } from "./latest";
+import { Latest } from "./connection";
 import { wholeChoice, type Choices, type Densities, type State, type Value } from "./protocol";
 import { Panel } from "./panel";
 import { SelectedChoice } from "./selected_choice";
-import { stateOf } from "./states";
+import { stateOf } from "./studio_data";
 import { VirtualList } from "./virtual_list";
 
 const ROW = 26;
@@ -23,8 +23,6 @@ interface Assignment {
 /** The tree of choices. */
 export class TracePanel extends Panel {
   readonly element: HTMLElement;
-  /** Called with each answered change while a choice is dragged, and after it. */
-  onMoved: (coarse: boolean) => void = () => {};
 
   private data: Choices | null = null;
   private rows: Row[] = [];
@@ -272,7 +270,7 @@ export class TracePanel extends Panel {
       store.set({ session: { ...now, revision: answer.revision, log_joint: answer.log_joint } });
     }
     this.showMoved(address, value, answer);
-    this.onMoved(!last);
+    store.set({ moved: { coarse: !last } });
     if (last) this.endDrag();
   }
 

@@ -1,10 +1,47 @@
 // The viewer: a frame's picture and its mesh side by side, and a slider over the frames. The
-// studio, the report and the notebook all use it; only their data differ.
+// studio, the report and the notebook all use it; only their data differ: in the studio they come
+// from the program, in a report they lie in the page, in a notebook the kernel has them.
 
 import { button, fill, h, number, Segments, select, setOptions } from "./dom";
 import { PictureView } from "./picture_view";
-import type { ViewerData } from "./viewer_data";
+import type { Camera, Mesh } from "./protocol";
 import { SpaceView } from "./space_view";
+
+/** One place of the viewer's slider. */
+export interface Frame {
+  label: string;
+  chain: number | null;
+  logJoint: number | null;
+}
+
+/** The address under which the page can show a picture. */
+export interface ImageUrl {
+  url: string;
+  /** True if `url` must be revoked when it is no longer shown. */
+  owned: boolean;
+}
+
+/** The scenes to view: a list of frames, with their meshes and pictures. */
+export interface ViewerData {
+  /** Changes when the frames mean something else. */
+  readonly key: string;
+  readonly frames: Frame[];
+  /** Layers that pictures have; empty: no pictures. */
+  readonly layers: string[];
+  /** True if frames can be rendered from another viewpoint. */
+  readonly viewpoints: boolean;
+  /** Shown beside pictures that do not follow the frames; otherwise null. */
+  readonly pictureNote: string | null;
+  /** The number of posterior draws, for ghosts and uncertainty; null: never any. */
+  readonly drawCount: number | null;
+  /** Identifies the photograph behind the scenes; null: none. */
+  readonly photoKey: string | null;
+  mesh(frame: number): Promise<Mesh>;
+  drawMesh(draw: number): Promise<Mesh>;
+  camera(frame: number): Promise<Camera | null>;
+  photo(): Promise<ImageUrl | null>;
+  picture(frame: number, layer: string, size: number, camera?: Camera): Promise<ImageUrl>;
+}
 
 const FRAMES_A_SECOND = 6;
 

@@ -3,11 +3,11 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { buildTree, passes, splitAddress, visibleRows } from "../src/address_tree";
-import { discreteValues, sliderRange } from "../src/choice_control";
 import { readPlace, writePlace } from "../src/fragment";
 import { ranks } from "../src/plot_data";
 import { byteLength, charOffset, isOpen } from "../src/prompt_panel";
 import type { Choice } from "../src/protocol";
+import { discreteValues, sliderRange } from "../src/selected_choice";
 import { evenly, Spread } from "../src/uncertainty";
 
 function choice(address: string, more: Partial<Choice> = {}): Choice {

@@ -4,15 +4,14 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 import { deflateSync } from "node:zlib";
+import { Store, type Known } from "../src/actions";
 import { readQuantities } from "../src/embedded_draws";
 import { EmbeddedData, type EmbeddedScene } from "../src/embedded_data";
 import { NotebookData } from "../src/notebook_data";
 import type { Camera, Mesh, Run, Session, State } from "../src/protocol";
 import { meshGeometry } from "../src/scene_geometry";
-import { stateOf } from "../src/states";
-import { Store, type Known } from "../src/store";
-import { StudioData } from "../src/studio_data";
-import type { ViewerData } from "../src/viewer_data";
+import { StudioData, stateOf } from "../src/studio_data";
+import type { ViewerData } from "../src/viewer";
 import { frame } from "./frames";
 
 // A roof: two triangles with a common edge, at a right angle.

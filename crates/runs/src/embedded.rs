@@ -17,8 +17,8 @@ use pcadlang_report::RunDir;
 use pcadlang_report::embedded::{EmbeddedDraw, embedded};
 use pcadlang_report::pictures::jpeg;
 use pcadlang_scene::render::View;
-use pcadlang_workbench::bank::{as_view, picture};
 use pcadlang_workbench::session::Layer;
+use pcadlang_workbench::session::{as_view, picture_operand};
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 
@@ -54,7 +54,7 @@ pub fn write_scene(
     for k in kept.iter().step_by(every) {
         let view = |mut t: Trace| {
             if found.is_none() {
-                found = picture(&mut t, draws);
+                found = picture_operand(&mut t, draws);
             }
             as_view(t.query(&[found?], draws).ok()?.first()?, None)
         };

@@ -7,7 +7,7 @@ use pcadlang_library::Model;
 use pcadlang_library::scene::ViewValue;
 use pcadlang_numerics::rng::{Purpose, StreamKey};
 use pcadlang_syntax::diag::Error;
-pub use pcadlang_workbench::bank::view;
+pub use pcadlang_workbench::session::view;
 use std::sync::Arc;
 
 /// Returns the random stream for values that no observation depends on.

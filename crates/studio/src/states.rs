@@ -1,12 +1,11 @@
 //! States of runs: which trace a name stands for, and its picture. Pictures are cached, and
 //! drawn so rarely that the chains do not slow down.
 
+use super::app::{no_view, picture};
 use super::protocol::{StateName, Viewpoint};
 use super::run::{Run, revision};
-use pcadlang_engine::lang::value::Located;
 use pcadlang_engine::trace::{SavedTrace, Trace};
 use pcadlang_inference::{KeptTrace, TrajectoryState};
-use pcadlang_library::scene::ImageValue;
 use pcadlang_report::Mode;
 use pcadlang_runs::drawing_budget::DrawingBudget;
 use pcadlang_runs::failure::{Failure, plain};
@@ -14,15 +13,11 @@ use pcadlang_runs::inputs::Ready;
 use pcadlang_runs::reopening::film::best_chain;
 use pcadlang_runs::reopening::reopened::Reopened;
 use pcadlang_runs::scene;
-use pcadlang_scene::render::{Camera, View};
 use pcadlang_workbench::session::Layer;
 use serde_json::{Map, Value, json};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
-
-/// The longer side of pictures, in pixels.
-const SIDES: std::ops::RangeInclusive<u32> = 16..=2048;
 
 /// A trace of a run, with the program it belongs to.
 pub struct RunState {
@@ -128,67 +123,6 @@ impl Run {
         self.pictures.keep(key, &picture);
         Ok(picture)
     }
-}
-
-/// The message where nothing can be drawn.
-pub fn no_view() -> Failure {
-    plain("the program has no view and no solid").hint("let view = scene.render(solid);")
-}
-
-/// Draws a picture of a scene as a file, with its header.
-pub fn picture(
-    view: &Arc<View>,
-    image: Option<&ImageValue>,
-    located: &[Located],
-    layer: Layer,
-    size: u32,
-    camera: Option<Viewpoint>,
-) -> Result<(Map<String, Value>, Vec<u8>), Failure> {
-    if !SIDES.contains(&size) {
-        return Err(plain(format!("`size` must be from {} to {}", SIDES.start(), SIDES.end())));
-    }
-    // From elsewhere the photograph does not lie behind the scene.
-    let drawn = match camera {
-        Some(viewpoint) => {
-            let camera = seen_from(viewpoint, view.camera())?;
-            let view = Arc::new(View::new(view.solid().clone(), camera));
-            layer.draw(&view, None, &[], size)
-        }
-        None => layer.draw(view, image, located, size),
-    };
-    let drawn = drawn.map_err(plain)?;
-    let bytes = encoded(&drawn)?;
-    let mut header = Map::new();
-    header.insert("type".into(), json!("image/png"));
-    header.insert("width".into(), json!(drawn.width()));
-    header.insert("height".into(), json!(drawn.height()));
-    Ok((header, bytes))
-}
-
-/// Encodes a picture as PNG at the least effort: the way to the page is short, and that takes
-/// a fraction of the time of JPEG.
-fn encoded(picture: &image::RgbImage) -> Result<Vec<u8>, Failure> {
-    use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-    let mut bytes = Vec::new();
-    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Sub);
-    picture.write_with_encoder(encoder).map_err(|e| plain(e.to_string()))?;
-    Ok(bytes)
-}
-
-/// Returns a camera at a viewpoint, with the size of another one's pictures.
-fn seen_from(v: Viewpoint, other: &Camera) -> Result<Camera, Failure> {
-    use glam::DVec3;
-    let wrong = || {
-        plain(
-            "`camera` needs an eye, another target, and an up that is not the direction between them",
-        )
-    };
-    let places = [v.eye, v.target, v.up].map(DVec3::from_array);
-    if !places[0].is_finite() || !(1.0..=170.0).contains(&v.fov_y) {
-        return Err(wrong());
-    }
-    let focal_px = 0.5 * f64::from(other.height) / (0.5 * v.fov_y.to_radians()).tan();
-    Camera::looking_at(places, focal_px, (other.width, other.height)).ok_or_else(wrong)
 }
 
 /// Maximum cached pictures per run.

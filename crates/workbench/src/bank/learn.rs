@@ -2,7 +2,8 @@
 //! only on the seed and its index.
 
 use super::write::BankWriter;
-use super::{BankError, Entry, Features, Named, as_view, picture};
+use super::{BankError, Entry, Features, Named};
+use crate::session::{as_view, picture_operand};
 use pcadlang_engine::lang::code::Operand;
 use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::{Draws, Trace};
@@ -47,7 +48,7 @@ pub struct Learn<'a> {
 /// written.
 pub fn learn(model: &Model, how: &Learn, path: &Path, done: &AtomicU64) -> Result<(), BankError> {
     let prior = Trace::prior(Arc::clone(model.code()), model.limits().clone());
-    let operand = picture(&mut prior.clone(), draws(how.seed, 0, 0)).ok_or_else(|| {
+    let operand = picture_operand(&mut prior.clone(), draws(how.seed, 0, 0)).ok_or_else(|| {
         BankError::Observed(
             "the program has nothing to draw: no top-level name is a view or a solid".into(),
         )

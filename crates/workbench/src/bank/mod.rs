@@ -16,7 +16,6 @@ mod join;
 mod learn;
 mod read;
 mod record;
-mod view;
 mod write;
 
 pub use error::BankError;
@@ -27,4 +26,3 @@ pub use join::join;
 pub use learn::{Learn, learn};
 pub use read::Bank;
 pub use record::{Entry, Named};
-pub use view::{as_view, picture, view};

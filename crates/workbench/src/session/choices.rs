@@ -1,9 +1,8 @@
-//! The choices of a state as data, for front ends that show them in their own way; `:set`,
-//! `:flip` and `:draw`, which change them.
+//! The choices of a state as data, for front ends that show them in their own way; their values
+//! as JSON and as text of bounded length; `:set`, `:flip` and `:draw`, which change them.
 
-use super::look::{ROWS, addressed, more};
+use super::look::{ROWS, more};
 use super::reply::Reply;
-use super::shown::{self, short};
 use super::state::Session;
 use crate::failure::{Failure, plain};
 use pcadlang_engine::lang::value::Value;
@@ -16,11 +15,13 @@ use pcadlang_syntax::ast::{ItemKind, StmtKind};
 use pcadlang_syntax::diag::SourceMap;
 use pcadlang_syntax::{parse, print_expr};
 use serde_json::{Number, json};
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::{self, Write};
 use std::sync::Arc;
 
 /// Maximum elements of an array that are written out.
-const ELEMENTS: usize = 1000;
+const ELEMENTS_AS_JSON: usize = 1000;
 
 /// A choice.
 #[derive(Clone, Debug)]
@@ -66,7 +67,7 @@ impl ChoiceRow {
 
     /// Formats the value briefly.
     pub fn text(&self) -> String {
-        shown::short(&self.value)
+        short(&self.value)
     }
 }
 
@@ -136,11 +137,89 @@ pub fn to_json(v: &Value) -> serde_json::Value {
         Value::Bool(b) => json!(b),
         Value::Str(s) => json!(&**s),
         Value::Array(_) | Value::List(_) => {
-            let most = v.len().unwrap_or(0).min(ELEMENTS);
+            let most = v.len().unwrap_or(0).min(ELEMENTS_AS_JSON);
             (0..most).map(|i| to_json(&v.element(i).unwrap_or_default())).collect()
         }
         Value::Record(r) => r.iter().map(|(k, v)| (k.to_string(), to_json(v))).collect(),
-        other => json!(shown::short(other)),
+        other => json!(short(other)),
+    }
+}
+
+/// The maximum length of a value shown by itself, in characters.
+const WHOLE: usize = 2000;
+/// The maximum length of a value in a table, in characters.
+const CELL: usize = 48;
+
+/// A text of bounded length.
+struct Bounded {
+    text: String,
+    left: usize,
+}
+
+impl Write for Bounded {
+    fn write_str(&mut self, s: &str) -> fmt::Result {
+        for c in s.chars() {
+            if self.left == 0 {
+                self.text.push('…');
+                return Err(fmt::Error);
+            }
+            self.left -= 1;
+            self.text.push(c);
+        }
+        Ok(())
+    }
+}
+
+/// Formats a value by itself, with numbers in full precision.
+pub(super) fn whole(v: &Value) -> String {
+    bounded(WHOLE, |out| write(out, v, &exact))
+}
+
+/// Formats a value briefly, with numbers to four digits.
+pub fn short(v: &Value) -> String {
+    bounded(CELL, |out| write(out, v, &number))
+}
+
+fn bounded(most: usize, f: impl FnOnce(&mut Bounded) -> fmt::Result) -> String {
+    let mut out = Bounded { text: String::new(), left: most };
+    // An error means that the text was cut off.
+    let _ = f(&mut out);
+    out.text
+}
+
+/// Formats all digits of a number, in scientific notation if it is very large or small.
+fn exact(x: f64) -> String {
+    let plain = x == 0.0 || !x.is_finite() || (1e-5..1e15).contains(&x.abs());
+    if plain { format!("{x}") } else { format!("{x:e}") }
+}
+
+/// The maximum number of elements shown.
+const ELEMENTS_AS_TEXT: usize = 8;
+
+fn write(out: &mut Bounded, v: &Value, number: &dyn Fn(f64) -> String) -> fmt::Result {
+    match v {
+        Value::Num(x) => out.write_str(&number(*x)),
+        Value::Array(_) | Value::List(_) => {
+            let n = v.len().unwrap_or(0);
+            out.write_char('[')?;
+            for i in 0..n.min(ELEMENTS_AS_TEXT) {
+                out.write_str(if i > 0 { ", " } else { "" })?;
+                write(out, &v.element(i).unwrap_or_default(), number)?;
+            }
+            if n > ELEMENTS_AS_TEXT {
+                write!(out, ", … {n} in all")?;
+            }
+            out.write_char(']')
+        }
+        Value::Record(r) => {
+            out.write_str("{ ")?;
+            for (i, (k, v)) in r.iter().enumerate() {
+                write!(out, "{}{k}: ", if i > 0 { ", " } else { "" })?;
+                write(out, v, number)?;
+            }
+            out.write_str(" }")
+        }
+        v => write!(out, "{v}"),
     }
 }
 
@@ -204,9 +283,9 @@ impl Session {
         for ((address, t), old) in found.iter().zip(&old).take(ROWS) {
             let new = match self.trace.was_removed(*t) || !self.trace.is_active(*t) {
                 true => "gone".to_owned(),
-                false => shown::short(&self.trace.value(*t)),
+                false => short(&self.trace.value(*t)),
             };
-            s += &format!("{address}: {} -> {new}\n", shown::short(old));
+            s += &format!("{address}: {} -> {new}\n", short(old));
         }
         s += &more(found.len(), "choices");
         if weight.appeared + weight.vanished > 0 {
@@ -298,6 +377,15 @@ impl Session {
     }
 }
 
+/// Turns a plain name or path, such as `x` or `t["x"]`, into an address, `@x`; other
+/// selections are unchanged.
+pub(super) fn addressed(text: &str) -> Cow<'_, str> {
+    let begins = text.starts_with(|c: char| c.is_alphabetic() || c == '_');
+    let name = text.split(['[', '/']).next().unwrap_or(text);
+    let is_name = name.chars().all(|c| c.is_alphanumeric() || c == '_');
+    if begins && is_name { Cow::Owned(format!("@{text}")) } else { Cow::Borrowed(text) }
+}
+
 /// Splits a text after its address; keys of addresses may contain spaces.
 fn split_address(text: &str) -> (&str, &str) {
     let mut depth = 0_i64;
@@ -366,7 +454,7 @@ mod tests {
         assert_eq!(to_json(&Value::Num(f64::INFINITY)), serde_json::Value::Null);
         assert_eq!(
             to_json(&Value::array(vec![0.0; 5000])).as_array().map(Vec::len),
-            Some(ELEMENTS)
+            Some(ELEMENTS_AS_JSON)
         );
     }
 
@@ -376,5 +464,23 @@ mod tests {
         assert_eq!(split_address("@t[\"a b\"]/x = [1, 2]"), ("@t[\"a b\"]/x", "[1, 2]"));
         assert_eq!(split_address("n=3"), ("n", "3"));
         assert_eq!(split_address("@a"), ("@a", ""));
+    }
+
+    #[test]
+    fn the_largest_values_are_a_few_letters() {
+        assert_eq!(whole(&Value::Num(1.0 / 3.0)), "0.3333333333333333");
+        assert_eq!(
+            (whole(&Value::Num(1e300)), whole(&Value::Num(-1e-300))),
+            ("1e300".into(), "-1e-300".into())
+        );
+        assert_eq!(short(&Value::array(vec![1.0 / 3.0; 3])), "[0.3333, 0.3333, 0.3333]");
+        // A list of itself, nested thirty deep: a billion characters if written out.
+        let mut v = Value::Str("x".into());
+        for _ in 0..30 {
+            v = Value::List(vec![v.clone(), v].into());
+        }
+        let text = whole(&v);
+        assert!(text.chars().count() == WHOLE + 1 && text.ends_with('…'));
+        assert!(short(&v).chars().count() <= CELL + 1);
     }
 }

@@ -1,12 +1,12 @@
 //! Directives: they are added to the program, and the trace is rebuilt with the choices
 //! that it had.
 
+use super::choices::{short, whole};
 use super::files::{exported, exported_operand};
 use super::redefine::{
     Key, Space, forgotten, items, key, to_forget, users, with_item, without_item,
 };
 use super::reply::Reply;
-use super::shown;
 use super::state::{INPUT, Session};
 use crate::failure::{Failure, plain};
 use pcadlang_engine::lang::code::{BlockKind, Operand};
@@ -229,11 +229,11 @@ impl Session {
             let draws = self.looks();
             if let Some(value) = self.trace.global(name, draws) {
                 let value = value.map_err(|e| Failure::run(&self.model, *e))?;
-                *said += &format!("{name} = {}\n", shown::short(&value));
+                *said += &format!("{name} = {}\n", short(&value));
             }
         }
         for text in &entry.samples {
-            *said += &format!("{}\n", shown::whole(&self.value_of(text)?));
+            *said += &format!("{}\n", whole(&self.value_of(text)?));
         }
         self.report(known.0, said)?;
         self.export(known.1, said)?;
@@ -298,7 +298,7 @@ impl Session {
         let model = Arc::clone(&self.model);
         for e in model.reports().iter().skip(known).flat_map(|r| &r.exprs) {
             if let Some(operand) = model.code().queries.get(&e.span) {
-                *said += &format!("{} = {}\n", print_expr(e), shown::whole(&self.asked(*operand)?));
+                *said += &format!("{} = {}\n", print_expr(e), whole(&self.asked(*operand)?));
             }
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! `:trace`: the choices of the state; `:why`: the dependencies of one.
 
+use super::choices::{addressed, short};
 use super::reply::Reply;
-use super::shown;
 use super::state::{INPUT, Session};
 use crate::failure::{Failure, plain};
 use pcadlang_engine::lang::plan::{Formula, Selection};
@@ -12,7 +12,6 @@ use pcadlang_report::number;
 use pcadlang_report::table::aligned;
 use pcadlang_syntax::diag::{SourceMap, nearest};
 use pcadlang_syntax::{parse_expr, print_expr};
-use std::borrow::Cow;
 
 /// The maximum number of rows of a table.
 pub(super) const ROWS: usize = 40;
@@ -28,7 +27,7 @@ impl Session {
         for (address, target) in targets.iter().take(ROWS) {
             let dist = t.dist(*target).map_or_else(String::new, |d| d.name().to_owned());
             let score = number(t.score_of(*target));
-            rows.push(vec![address.to_string(), shown::short(&t.value(*target)), dist, score]);
+            rows.push(vec![address.to_string(), short(&t.value(*target)), dist, score]);
         }
         let mut text = if targets.is_empty() { "no choices\n".to_owned() } else { aligned(&rows) };
         text += &more(targets.len(), "choices");
@@ -113,15 +112,6 @@ pub(super) fn more(rows: usize, what: &str) -> String {
     if rows > ROWS { format!("… and {} more {what}\n", rows - ROWS) } else { String::new() }
 }
 
-/// Turns a plain name or path, such as `x` or `t["x"]`, into an address, `@x`; other
-/// selections are unchanged.
-pub(super) fn addressed(text: &str) -> Cow<'_, str> {
-    let begins = text.starts_with(|c: char| c.is_alphabetic() || c == '_');
-    let name = text.split(['[', '/']).next().unwrap_or(text);
-    let is_name = name.chars().all(|c| c.is_alphanumeric() || c == '_');
-    if begins && is_name { Cow::Owned(format!("@{text}")) } else { Cow::Borrowed(text) }
-}
-
 impl Session {
     /// `:why @a`.
     pub(super) fn why(&mut self, text: &str) -> Result<Reply, Failure> {
@@ -132,7 +122,7 @@ impl Session {
             return Err(failure.hint(format!("ask for one of them: {}, …", first.join(", "))));
         };
         let (value, score) =
-            (shown::short(&self.trace.value(*target)), number(self.trace.score_of(*target)));
+            (short(&self.trace.value(*target)), number(self.trace.score_of(*target)));
         let dist = self.trace.dist(*target).map_or_else(String::new, |d| d.name().to_owned());
         let mut s = format!("{address} = {value}, drawn from {dist}, log density {score}\n");
         let origins = self.trace.origins(*target);

@@ -20,18 +20,19 @@ mod plot;
 mod redefine;
 mod reply;
 mod run;
-mod shown;
 mod state;
 
 pub use crate::failure::Failure;
 pub use background::Status;
-pub use choices::{ChoiceRow, Marks, Scores, to_json};
+pub use choices::{ChoiceRow, Marks, Scores, short, to_json};
 pub use command::{COMMANDS, Command};
 pub use complete::Completion;
 pub use files::{exported, exported_operand};
-pub use picture::{Layer, ViewPicture, detected, observed_image, over, photo_contours};
+pub use picture::{
+    Layer, ViewPicture, as_view, detected, observed_image, over, photo_contours, picture_operand,
+    view,
+};
 pub use reply::{Reply, Request};
-pub use shown::short;
 pub use state::Session;
 
 impl Session {
@@ -49,7 +50,7 @@ impl Session {
             None if text.starts_with(['@', '$']) => self.show_trace(text),
             None if pcadlang_syntax::is_directive(text) => self.add(text),
             None => match (self.value_of(text), command::alias(text)) {
-                (Ok(v), _) => Ok(Reply::text(shown::whole(&v) + "\n")),
+                (Ok(v), _) => Ok(Reply::text(choices::whole(&v) + "\n")),
                 // A name of the program takes precedence over a command.
                 (Err(_), Some(command)) => self.command(command),
                 (Err(e), None) => Err(e),

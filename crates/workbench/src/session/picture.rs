@@ -1,17 +1,17 @@
-//! `:render`, the picture of the scene, rendered only when a front end needs its pixels, and
-//! the layers of a picture: surface over the photograph, depth, contours and others.
+//! The picture of the scene: the view of a program, `:render`, rendered only when a front end
+//! needs its pixels, and the layers: surface over the photograph, depth, contours and others.
 
 use super::reply::Reply;
 use super::state::Session;
-use crate::bank;
 use crate::failure::{Failure, plain};
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use pcadlang_engine::lang::code::{Code, Operand};
 use pcadlang_engine::lang::value::{Located, Value};
-use pcadlang_library::scene::{ImageValue, ViewValue};
+use pcadlang_engine::trace::{Draws, Trace};
+use pcadlang_library::scene::{ImageValue, SolidValue, ViewValue};
 use pcadlang_report::pictures;
-use pcadlang_scene::render::View;
+use pcadlang_scene::render::{Camera, View};
 use pcadlang_scene::vision::{ContourMap, Photo};
 use pcadlang_syntax::diag::nearest;
 use std::path::PathBuf;
@@ -67,7 +67,50 @@ pub fn detected(out: &mut RgbImage, located: &[Located], (width, height): (u32, 
     pictures::dots(out, (width, height), &seen, pictures::DETECTED);
 }
 
+/// Returns the operand of a program's picture: the last top-level name that is a view,
+/// otherwise the last that is a solid.
+pub fn picture_operand(trace: &mut Trace, draws: Draws) -> Option<Operand> {
+    let globals: Vec<Operand> = trace.code().globals.values().rev().copied().collect();
+    let mut solid = None;
+    for o in globals {
+        let Ok(values) = trace.query(&[o], draws) else { continue };
+        let Some(v) = values.first() else { continue };
+        if v.downcast::<ViewValue>().is_some() {
+            return Some(o);
+        }
+        if solid.is_none() && v.downcast::<SolidValue>().is_some() {
+            solid = Some(o);
+        }
+    }
+    solid
+}
+
+/// Converts a value to a view: a view itself, or a solid seen from `camera` (by default,
+/// the default camera at 256 x 256).
+pub fn as_view(value: &Value, camera: Option<Camera>) -> Option<Arc<View>> {
+    if let Some(v) = value.downcast::<ViewValue>() {
+        return Some(Arc::clone(&v.0));
+    }
+    let camera = camera.unwrap_or_else(|| Camera::default_for(256, 256));
+    value.downcast::<SolidValue>().map(|s| Arc::new(View::new(s.0.clone(), camera)))
+}
+
+/// Returns a program's view: the last top-level name that is a view, or else the last
+/// solid, seen from a camera.
+pub fn view(trace: &mut Trace, draws: Draws, camera: Option<Camera>) -> Option<Arc<View>> {
+    let at = picture_operand(trace, draws)?;
+    let values = trace.query(&[at], draws).ok()?;
+    as_view(values.first()?, camera)
+}
+
 impl Session {
+    /// Returns the view of the scene in the present state; `None` if the program has no view
+    /// and no solid.
+    pub fn view(&mut self) -> Option<Arc<View>> {
+        let draws = self.looks();
+        view(&mut self.trace, draws, None)
+    }
+
     /// `:render [name] [file]`.
     pub(super) fn render(&mut self, text: &str) -> Result<Reply, Failure> {
         let mut words: Vec<&str> = text.split_whitespace().collect();
@@ -77,7 +120,7 @@ impl Session {
         file.map_or(Ok(()), |f| self.permit(f))?;
         let draws = self.looks();
         let operand = match words[..] {
-            [] => bank::picture(&mut self.trace, draws).ok_or_else(|| {
+            [] => picture_operand(&mut self.trace, draws).ok_or_else(|| {
                 plain("the program has no view and no solid")
                     .hint("let view = scene.render(solid);")
             })?,
@@ -86,7 +129,7 @@ impl Session {
         };
         let values =
             self.trace.query(&[operand], draws).map_err(|e| Failure::run(&self.model, *e))?;
-        let Some(view) = values.first().and_then(|v| bank::as_view(v, None)) else {
+        let Some(view) = values.first().and_then(|v| as_view(v, None)) else {
             let what = values.first().map_or("nothing", |v| v.type_name());
             return Err(plain(format!("`{text}` is {what}: only views and solids can be seen")));
         };

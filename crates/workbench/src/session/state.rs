@@ -2,14 +2,12 @@
 
 use super::background::{Background, Finished, Status};
 use super::reply::Reply;
-use crate::bank;
 use crate::failure::{Failure, plain};
 use pcadlang_engine::lang::code::{Eager, Observed};
 use pcadlang_engine::lang::reach::path_within;
 use pcadlang_engine::trace::{Address, Constraint, Draws, Limits, Stop, Trace};
 use pcadlang_library::model::{Model, Program};
 use pcadlang_numerics::rng::{Purpose, StreamKey};
-use pcadlang_scene::render::View;
 use std::collections::{BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -172,13 +170,6 @@ impl Session {
     /// Returns what `:undo` would undo, and what `:redo` would redo.
     pub fn history(&self) -> [Option<&str>; 2] {
         [self.past.back(), self.undone.last()].map(|s| s.map(|s| s.what.as_str()))
-    }
-
-    /// Returns the view of the scene in the present state; `None` if the program has no view
-    /// and no solid.
-    pub fn view(&mut self) -> Option<Arc<View>> {
-        let draws = self.looks();
-        bank::view(&mut self.trace, draws, None)
     }
 
     /// Returns the random stream for values that are only inspected.
