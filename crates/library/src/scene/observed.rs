@@ -455,8 +455,7 @@ mod tests {
         let prepared = Prepared::default();
         let get = |key: u32, made: u32| *prepared.get(key, |_| Ok(made)).unwrap();
         get(0, 7);
-        let first: Arc<u32> = prepared.get(1_u32, |_| Ok(2)).unwrap();
-        let first = Arc::downgrade(&first);
+        let first = Arc::downgrade(&prepared.get(1_u32, |_| Ok(2_u32)).unwrap());
         prepared.get("another type", |_| Ok(())).unwrap();
         for key in 0..1000 {
             assert_eq!(get(key, key + 1), if key == 0 { 7 } else { key + 1 });
