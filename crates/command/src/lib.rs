@@ -20,7 +20,6 @@ mod tradeoff;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, Parser};
-use pcadlang_runs::failure::plain;
 use pcadlang_runs::reopening::{compare, film, page, show};
 use pcadlang_runs::term;
 use programs::{calibrate, check, doc, fmt, predict, watch};
@@ -55,7 +54,7 @@ pub fn command(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Doc(a) => doc::doc(&a),
         Command::Repl(a) => repl::repl(&a),
         Command::Fmt(a) => fmt::fmt(&a),
-        Command::Lsp => pcadlang_workbench::lsp::lsp().map_err(plain),
+        Command::Lsp => pcadlang_workbench::lsp::lsp(),
         Command::Studio(a) => pcadlang_studio::studio(&a),
         Command::Completions(a) => manual::completions(&a, Cli::command()),
         Command::Man(a) => manual::man(&a, Cli::command()),

@@ -62,8 +62,7 @@ impl Live {
         let draws = scene::predictive(0, 0);
         let mut trace = scene::rebuilt(&ready.model, &best.choices, draws)?;
         if let Some(view) = scene::view(&mut trace, draws, None) {
-            let picture =
-                Layer::Overlay.draw(&view, ready.image(), &trace.located(), SIDE).map_err(plain)?;
+            let picture = Layer::Overlay.draw(&view, ready.image(), &trace.located(), SIDE)?;
             self.send(
                 "overlay.png",
                 "image/png",

@@ -364,11 +364,10 @@ pub fn picture(
         Some(viewpoint) => {
             let camera = seen_from(viewpoint, view.camera())?;
             let view = Arc::new(View::new(view.solid().clone(), camera));
-            layer.draw(&view, None, &[], size)
+            layer.draw(&view, None, &[], size)?
         }
-        None => layer.draw(view, image, located, size),
+        None => layer.draw(view, image, located, size)?,
     };
-    let drawn = drawn.map_err(plain)?;
     let bytes = encoded(&drawn)?;
     let mut header = Map::new();
     header.insert("type".into(), json!("image/png"));

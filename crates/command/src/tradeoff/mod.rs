@@ -38,7 +38,7 @@ const THREADS: usize = 2;
 /// The time of a run, with compilation and scoring, relative to its own time limit.
 const OVERHEAD: f64 = 1.1;
 
-/// What is to be measured, and the results so far.
+/// The settings and cases to be measured, and the results so far.
 struct Measurement<'a> {
     a: &'a Tradeoff,
     settings: Vec<Setting>,

@@ -33,7 +33,7 @@ struct Snapshot {
     sums: RunningSums,
 }
 
-/// What is monitored while chains run.
+/// The quantities that are monitored while chains run.
 struct Watched {
     begun: Instant,
     best: Arc<BestSoFar>,
@@ -50,7 +50,7 @@ impl Watched {
     }
 }
 
-/// What to run.
+/// A run to be done.
 #[derive(Clone, Copy)]
 pub struct Task<'a> {
     /// The setting.

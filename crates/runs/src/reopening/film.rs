@@ -108,8 +108,7 @@ fn frames(
     states: &[SavedTrace],
     a: &Film,
 ) -> Result<Vec<FilmFrame>, Failure> {
-    let drawn =
-        |layer: Layer, view: &Arc<View>, image| layer.draw(view, image, &[], a.size).map_err(plain);
+    let drawn = |layer: Layer, view: &Arc<View>, image| layer.draw(view, image, &[], a.size);
     let mut frames = Vec::new();
     let mut best = None;
     for saved in states {

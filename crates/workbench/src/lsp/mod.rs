@@ -8,6 +8,7 @@ mod published;
 mod requests;
 mod tokens;
 
+use crate::failure::{Failure, plain};
 use documents::Documents;
 use lsp_server::{Connection, ErrorCode, Message, Notification, Request, Response};
 use lsp_types::notification::{
@@ -24,18 +25,18 @@ use lsp_types::{
 use positions::Encoding;
 
 /// Serves one editor until it says goodbye.
-pub fn lsp() -> Result<(), String> {
+pub fn lsp() -> Result<(), Failure> {
     let (connection, threads) = Connection::stdio();
     let served = serve(&connection);
     // Its threads end when the connection is closed.
     drop(connection);
-    threads.join().map_err(|e| format!("the connection failed: {e}"))?;
+    threads.join().map_err(|e| plain(format!("the connection failed: {e}")))?;
     served
 }
 
 /// Serves a client over a connection until it says goodbye or leaves.
-pub fn serve(connection: &Connection) -> Result<(), String> {
-    let failed = |e: &dyn std::fmt::Display| format!("the language server stopped: {e}");
+pub fn serve(connection: &Connection) -> Result<(), Failure> {
+    let failed = |e: &dyn std::fmt::Display| plain(format!("the language server stopped: {e}"));
     let (id, params) = connection.initialize_start().map_err(|e| failed(&e))?;
     let client: InitializeParams = serde_json::from_value(params).unwrap_or_default();
     let encoding = encoding(&client);

@@ -238,10 +238,10 @@ impl Layer {
         image: Option<&ImageValue>,
         located: &[Located],
         size: u32,
-    ) -> Result<RgbImage, String> {
+    ) -> Result<RgbImage, Failure> {
         let photo = image.and_then(ImageValue::as_photo);
-        let needed = || photo.ok_or("there is no photograph".to_owned());
-        let seen = || image.and_then(photo_contours).ok_or("there is no photograph".to_owned());
+        let needed = || photo.ok_or_else(|| plain("there is no photograph"));
+        let seen = || image.and_then(photo_contours).ok_or_else(|| plain("there is no photograph"));
         let camera = view.camera();
         let of = photo.map_or((camera.width, camera.height), |p| (p.width(), p.height()));
         let (width, height) = scaled(of, size);
@@ -271,7 +271,7 @@ impl Layer {
             }
             Layer::Joints => {
                 if located.is_empty() {
-                    return Err("no joints were found in the photograph".to_owned());
+                    return Err(plain("no joints were found in the photograph"));
                 }
                 let mut out = match photo {
                     Some(p) => resize(p.rgb(), width, height, FilterType::Triangle),

@@ -11,7 +11,7 @@ use serde::Serialize;
 pub struct Row {
     /// The name of the setting.
     pub setting: String,
-    /// Whether this is the end of its runs. Only an end can be reproduced by a run with
+    /// True at the end of its runs. Only an end can be reproduced by a run with
     /// that time limit, because schedules depend on the limit.
     pub end: bool,
     /// Seconds from the start, the mean over the runs.
@@ -32,7 +32,7 @@ pub struct Row {
     pub scores: IndexMap<String, f64>,
     /// Effective sample size per second, the median over runs, if known.
     pub ess_per_second: Option<f64>,
-    /// Whether the row is on the front.
+    /// True if the row is on the front.
     pub front: bool,
 }
 

@@ -69,7 +69,7 @@ pub struct Plan {
     /// The number of additional settings in which every name of `vary` takes a random one
     /// of its values or that of the base.
     pub random: usize,
-    /// Whether these settings are for comparison only: they are in the table, but never
+    /// True if these settings are for comparison only: they are in the table, but never
     /// become presets. For example, they may reduce the measured error at the expense of
     /// other qualities.
     pub compare: bool,
