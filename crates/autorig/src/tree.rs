@@ -23,7 +23,7 @@ struct Chain {
     points: Vec<DVec3>,
     /// The distance from its end to the surface.
     clearance: f64,
-    /// Whether no chain continues it.
+    /// True if no chain continues it.
     ends: bool,
 }
 

@@ -32,7 +32,7 @@ pub struct NetworkOptions {
     pub output: Output,
     /// The map holds log odds, not probabilities.
     pub logits: bool,
-    /// What the map shows.
+    /// The content of the map.
     pub shows: Shows,
 }
 

@@ -26,7 +26,7 @@ pub struct Batch<'a> {
     /// The draws of each task, one after the other.
     pub draws: Vec<Vec<Draw>>,
     pub vertices: Vertices<'a>,
-    /// Whether each scene is for the CPU.
+    /// By scene: true if it is for the CPU.
     pub for_cpu: Vec<bool>,
     /// The most vertices of a scene.
     pub most: u32,

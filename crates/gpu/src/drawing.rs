@@ -27,7 +27,7 @@ const OUTPUT_BYTES: u64 = 20;
 /// Bytes of the number of visible pieces, padded.
 const WRITTEN_BYTES: u64 = 8;
 
-/// What the device holds.
+/// The buffers on the device.
 pub struct Drawing {
     pub device: Device,
     pub topologies: Topologies,
@@ -55,7 +55,7 @@ pub struct Sent {
     room: u64,
 }
 
-/// What came back: of each scene, and the lists of all pieces.
+/// The results: of each scene, and the lists of all pieces.
 #[derive(Clone, Copy, Default)]
 pub struct Drawn<'a> {
     outcomes: &'a [Outcome],
@@ -63,12 +63,12 @@ pub struct Drawn<'a> {
 }
 
 impl Drawn<'_> {
-    /// What became of a scene, if it was drawn.
+    /// The outcome of a scene, if it was drawn.
     pub fn outcome(&self, i: usize) -> Option<&Outcome> {
         self.outcomes.get(i).filter(|o| o.status == DRAWN)
     }
 
-    /// Whether there were more pieces than room.
+    /// True if there were more pieces than room.
     pub fn lacks_room(&self) -> bool {
         self.outcomes.iter().any(|o| o.status == NO_ROOM)
     }

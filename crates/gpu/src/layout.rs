@@ -130,7 +130,7 @@ impl Draw {
     }
 }
 
-/// What became of a scene.
+/// The outcome of a scene.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Outcome {

@@ -36,7 +36,7 @@ impl Gpu {
         &self.name
     }
 
-    /// What went wrong on the device, after which the CPU draws everything.
+    /// The fault of the device, after which the CPU draws everything.
     pub fn error(&self) -> Option<String> {
         self.lock().device.error().cloned()
     }
@@ -116,7 +116,7 @@ impl Gpu {
                 (own, batch, slot, sent)
             });
             if let Some((own, batch, slot, mut sent)) = before.take() {
-                // Whether there was room, and so everything was read.
+                // True if there was room, and so everything was read.
                 let mut collect = |sent: &Sent, drawing: &mut Drawing, is_last: bool| {
                     drawing.collect(sent, |drawn| {
                         let fits = is_last || !drawn.lacks_room();
@@ -142,7 +142,7 @@ impl Gpu {
         }
     }
 
-    /// What the CPU gives for the scenes that the device has not drawn, by number.
+    /// The CPU's results for the scenes that the device has not drawn, by number.
     fn left<T: Send>(
         &self,
         scenes: &[Scene],

@@ -47,7 +47,7 @@ impl ContourBatch {
         self.ends.len().min(self.sizes.len())
     }
 
-    /// Whether there are no scenes.
+    /// True if there are no scenes.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -44,7 +44,7 @@ struct Like {
     place: Option<Place>,
 }
 
-/// Whether heights never fall along the path.
+/// True if heights never fall along the path.
 fn is_rising(surface: &Revolution) -> bool {
     surface.rings().is_sorted_by(|a, b| a.y <= b.y)
 }

@@ -12,7 +12,7 @@ use wgpu::WriteOnly;
 /// Bytes that a task writes at a time.
 const BLOCK: usize = 1 << 16;
 
-/// What the list consists of.
+/// The elements of the list.
 #[derive(Clone, Copy)]
 pub enum VertexData<'a> {
     /// Positions, then normals.

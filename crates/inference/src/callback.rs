@@ -17,7 +17,7 @@ pub trait Callback: fmt::Debug + Send + Sync {
     /// order, chains in any order.
     fn draw(&self, chain: u32, trace: &mut Trace, draws: Draws);
 
-    /// What the callback has gathered from a chain, for a checkpoint.
+    /// The state of the callback for a chain, for a checkpoint.
     fn save(&self, chain: u32) -> Vec<u8> {
         let _ = chain;
         Vec::new()
@@ -40,7 +40,7 @@ pub trait Callback: fmt::Debug + Send + Sync {
         let _ = (chain, steps, trace);
     }
 
-    /// Whether all chains of the run should end; called between steps.
+    /// True if all chains of the run should end; called between steps.
     fn is_over(&self) -> bool {
         false
     }

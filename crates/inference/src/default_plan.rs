@@ -154,7 +154,7 @@ impl Program {
         self.draws.iter_mut().map(|t| of_kind(t, kind).len()).max().unwrap_or(0)
     }
 
-    /// Whether which choices exist depends on those of a kind.
+    /// True if which choices exist depends on those of a kind.
     fn depends_on(&self, kind: ChoiceKind) -> bool {
         self.draws.iter().any(|t| t.structure_depends_on(kind))
     }
@@ -220,7 +220,7 @@ impl Program {
         (any && rough.len() <= NAMED).then_some(rough)
     }
 
-    /// Whether draws from the prior are impossible, or a short ascent from the best of them
+    /// True if draws from the prior are impossible, or a short ascent from the best of them
     /// ends so far below those from uniform starts in the unconstrained space that chains had
     /// better begin there.
     fn lies_far(&self, uniform: impl Fn(u64) -> TraceResult<Trace>) -> bool {
@@ -240,7 +240,7 @@ impl Program {
         near.0 > f64::NEG_INFINITY && near.0 - prior.0 > FAR.0 + FAR.1 * near.1
     }
 
-    /// Whether all finite choices can be summed out on a tape, and that costs little compared
+    /// True if all finite choices can be summed out on a tape, and that costs little compared
     /// with a sweep over them.
     fn sum_pays(&mut self) -> bool {
         let pays = |trace: &mut Trace| {
@@ -282,19 +282,19 @@ impl Program {
     }
 }
 
-/// What an exact draw of all finite choices costs.
+/// The cost of an exact draw of all finite choices.
 #[derive(Default)]
 struct Joint {
     /// The entries of all tables.
     entries: usize,
     /// The scores that a sweep of `gibbs` evaluates.
     sweep: usize,
-    /// Whether choices depend on each other.
+    /// True if choices depend on each other.
     coupled: bool,
 }
 
 impl Joint {
-    /// Whether it is worth while each time that other choices have moved.
+    /// True if it is worth while each time that other choices have moved.
     fn pays(&self) -> bool {
         self.coupled && self.entries <= EXACT_PAYS * self.sweep
     }
@@ -317,7 +317,7 @@ fn gradient(trace: &Trace, targets: &[Target], power: f64) -> TraceResult<Vec<f6
     trace.gradient(targets, power, &mut g).map(|()| g)
 }
 
-/// Whether the likelihood changes with a choice.
+/// True if the likelihood changes with a choice.
 fn responds(trace: &mut Trace, t: Target) -> bool {
     let key = StreamKey::new(0, 0, Purpose::MIX);
     (0..4).any(|substream| {

@@ -68,7 +68,7 @@ pub trait Sink: Send {
         Ok(None)
     }
 
-    /// Whether the sink stores checkpoints.
+    /// True if the sink stores checkpoints.
     fn takes_checkpoints(&self) -> bool {
         false
     }
@@ -125,7 +125,7 @@ impl Shape {
         }
     }
 
-    /// Whether it holds no numbers.
+    /// True if it holds no numbers.
     pub fn is_empty(self) -> bool {
         self.len() == 0
     }
@@ -191,7 +191,7 @@ impl Layout {
         Layout(to.iter().flat_map(place).collect())
     }
 
-    /// Whether rows of `width` numbers remain unchanged.
+    /// True if rows of `width` numbers remain unchanged.
     pub fn is_same(&self, width: usize) -> bool {
         self.0.len() == width && self.0.iter().enumerate().all(|(i, from)| *from == Some(i))
     }

@@ -23,7 +23,7 @@ pub(crate) struct Forced {
     given: Vec<(u64, Constraint)>,
 }
 
-/// What is known of a statement, from the states that were drawn so far.
+/// The knowledge of a statement, from the states that were drawn so far.
 enum Known {
     /// No state had its choice.
     Nothing,
@@ -72,7 +72,7 @@ impl Forced {
         Ok(forced)
     }
 
-    /// Whether there are no statements.
+    /// True if there are no statements.
     pub fn is_empty(&self) -> bool {
         self.statements.is_empty()
     }

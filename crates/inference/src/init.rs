@@ -69,7 +69,7 @@ pub enum StartError {
     Impossible(NoStart),
 }
 
-/// What has zero probability in the last draw.
+/// The terms with zero probability in the last draw.
 #[derive(Debug, Clone, Default)]
 pub struct NoStart {
     /// Observations and factors first, then choices.

@@ -18,7 +18,7 @@ pub struct StepContext {
     pub chain: u32,
     /// The step of the chain.
     pub step: u64,
-    /// Whether kernels may adapt (inside `warmup`).
+    /// True if kernels may adapt (inside `warmup`).
     pub adapting: bool,
     /// The power of the likelihood: 1 except in annealed warm-up.
     pub power: f64,
@@ -57,7 +57,7 @@ impl StepContext {
     }
 }
 
-/// What a step did.
+/// The outcome of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Proposals made.
@@ -146,7 +146,7 @@ pub trait Kernel: Send {
         None
     }
 
-    /// What the kernel has adapted and remembers, beside the state it moved last, for a
+    /// The kernel's adaptation and memory, beside the state it moved last, for a
     /// checkpoint; empty if each step is a function of the state alone.
     fn save(&self, trace: &Trace) -> Vec<u8> {
         let _ = trace;

@@ -9,7 +9,7 @@ use std::time::Duration;
 /// How often a waiting chain looks whether its run was cancelled.
 const PATIENCE: Duration = Duration::from_millis(50);
 
-/// Whether the chains of a run are to wait. A paused chain goes on where it was: its draws
+/// True if the chains of a run are to wait. A paused chain goes on where it was: its draws
 /// are those of a run without the pause, and the pause does not count for a time limit.
 #[derive(Debug, Default)]
 pub struct Pause {

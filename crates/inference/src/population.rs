@@ -46,7 +46,7 @@ impl Population {
         Population { first: members.len(), members, turn: 0, steps: 0, power: None }
     }
 
-    /// Whether the population is valid; one read from a checkpoint may not be.
+    /// True if the population is valid; one read from a checkpoint may not be.
     pub fn fits(&self) -> bool {
         (self.members.is_empty() || self.turn < self.members.len()) && self.steps < 1 << 60
     }

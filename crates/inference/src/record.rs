@@ -25,7 +25,7 @@ impl Recorder {
         Recorder { collects, columns: Vec::new(), observed: None }
     }
 
-    /// Whether the plan says what to collect.
+    /// True if the plan says what to collect.
     pub fn collects(&self) -> bool {
         self.collects
     }

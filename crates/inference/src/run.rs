@@ -39,10 +39,10 @@ pub struct RunOptions {
     pub callback: Option<Arc<dyn Callback>>,
     /// Finds the neighbours that `knn` proposes from.
     pub banks: Option<Arc<dyn Banks>>,
-    /// Whether to count the proposals of single-site kernels by address; this costs a few
+    /// True to count the proposals of single-site kernels by address; this costs a few
     /// percent of a fast step.
     pub sites: bool,
-    /// Whether to record the log density of each observed value with every draw, as the
+    /// True to record the log density of each observed value with every draw, as the
     /// column `log_lik`, if there are at most 1000 of them.
     pub pointwise: bool,
     /// The number of the first chain. Chains with the same seed and number have the same
@@ -108,13 +108,13 @@ pub struct ChainResult {
     pub warmup: u64,
     /// The number of draws recorded.
     pub draws: u64,
-    /// What the kernels did.
+    /// Counts of what the kernels did.
     pub kernels: Vec<KernelStats>,
-    /// What single-site kernels did, by address, if [`RunOptions::sites`] is set.
+    /// Counts of single-site kernels, by address, if [`RunOptions::sites`] is set.
     pub sites: Vec<SiteStats>,
     /// Wall time.
     pub seconds: f64,
-    /// What had probability zero in all states with the values that `force` sets, so that the
+    /// The terms with probability zero in all states with the values that `force` sets, so that the
     /// chain started without them.
     pub contradicted: Option<NoStart>,
 }
@@ -133,7 +133,7 @@ pub enum ChainError {
 }
 
 impl ChainError {
-    /// Whether the chain found no state to start from. Another chain may find one, so that this
+    /// True if the chain found no state to start from. Another chain may find one, so that this
     /// must not lose the draws of the others.
     #[doc(hidden)]
     pub fn is_of_the_start(&self) -> bool {

@@ -1,4 +1,4 @@
-//! What the kernels of a chain did.
+//! Counts of what the kernels of a chain did.
 
 use serde::{Deserialize, Serialize};
 
@@ -67,7 +67,7 @@ impl SiteStats {
         sum.into_values().collect()
     }
 
-    /// Whether the choice never moved, although other values of it are possible.
+    /// True if the choice never moved, although other values of it are possible.
     pub fn is_stuck(&self) -> bool {
         self.proposals >= JUDGED && self.accepted == 0 && self.possible > 0
     }

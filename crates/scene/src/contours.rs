@@ -95,7 +95,7 @@ impl Contours {
         self.x.len()
     }
 
-    /// Whether there are no pieces.
+    /// True if there are no pieces.
     pub fn is_empty(&self) -> bool {
         self.x.is_empty()
     }
@@ -112,7 +112,7 @@ impl ContourSlice<'_> {
         self.x.len().min(self.y.len()).min(self.tx.len()).min(self.ty.len()).min(self.length.len())
     }
 
-    /// Whether there are no pieces.
+    /// True if there are no pieces.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -126,19 +126,19 @@ impl ContourChange {
         ContourChange { to: Arc::clone(&from), from, removed, added, moving: contours, count }
     }
 
-    /// Whether no pieces stay from change to change.
+    /// True if no pieces stay from change to change.
     pub(crate) fn all_move(&self) -> bool {
         self.moving.len() == self.count
     }
 
-    /// Whether the change starts from the known contours and is shorter than starting from
+    /// True if the change starts from the known contours and is shorter than starting from
     /// scratch.
     pub(crate) fn follows(&self, known: Option<&Arc<()>>) -> bool {
         self.removed.len() + self.added.len() < self.count
             && known.is_some_and(|known| Arc::ptr_eq(known, &self.from))
     }
 
-    /// Whether the change ends at the known contours.
+    /// True if the change ends at the known contours.
     pub(crate) fn leads_to(&self, known: Option<&Arc<()>>) -> bool {
         known.is_some_and(|known| Arc::ptr_eq(known, &self.to))
     }

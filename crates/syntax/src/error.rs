@@ -94,7 +94,7 @@ pub(crate) struct Advice {
     pub message: Option<String>,
     /// The label at its place.
     pub label: Option<String>,
-    /// What to write instead.
+    /// The replacement.
     pub hint: Option<String>,
     /// The index of the token to point at, if it is not the one that did not fit.
     pub place: Option<usize>,

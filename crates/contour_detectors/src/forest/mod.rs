@@ -69,7 +69,7 @@ impl Forest {
         read::forest(bytes).map_err(VisionError::Detector)
     }
 
-    /// Whether bytes begin like such a file.
+    /// True if bytes begin like such a file.
     pub fn is_forest(bytes: &[u8]) -> bool {
         read::is_gzip(bytes) || bytes.starts_with(b"%YAML")
     }

@@ -16,7 +16,7 @@ const PIXELS: usize = 1 << 27;
 /// The maximum side of a patch.
 const PATCH: usize = 128;
 
-/// Whether bytes begin like a gzip file.
+/// True if bytes begin like a gzip file.
 pub fn is_gzip(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x1f, 0x8b])
 }

@@ -23,7 +23,7 @@ pub struct Tokens<R> {
     /// Bytes read so far.
     read: u64,
     most: u64,
-    /// Whether this line has had anything other than spaces, and whether it began with
+    /// True if this line has had anything other than spaces, and whether it began with
     /// spaces.
     begun: bool,
     indented: bool,

@@ -61,12 +61,12 @@ pub struct GewekeRow {
     pub z_mean: f64,
     /// The z-score of the mean square of positions.
     pub z_square: f64,
-    /// Whether both are within the threshold.
+    /// True if both are within the threshold.
     pub passes: bool,
 }
 
 impl Geweke {
-    /// Whether every quantity passes.
+    /// True if every quantity passes.
     pub fn passes(&self) -> bool {
         self.rows.iter().all(|r| r.passes)
     }

@@ -58,15 +58,15 @@ pub struct SbcRow {
     pub p: f64,
     /// The smallest effective sample size of a chain.
     pub least_ess: f64,
-    /// Whether more than a tenth of the chains had fewer independent draws than are
+    /// True if more than a tenth of the chains had fewer independent draws than are
     /// ranked: ranks then pile up at both ends even if the kernels are correct.
     pub is_short: bool,
-    /// Whether the ranks are consistent with uniform ones.
+    /// True if the ranks are consistent with uniform ones.
     pub passes: bool,
 }
 
 impl Sbc {
-    /// Whether every quantity passes.
+    /// True if every quantity passes.
     pub fn passes(&self) -> bool {
         self.rows.iter().all(|r| r.passes)
     }

@@ -38,7 +38,7 @@ pub(crate) struct KernelMaker {
 }
 
 impl KernelMaker {
-    /// What makes this kernel; `None` of any other built-in.
+    /// The maker of this kernel; `None` of any other built-in.
     pub fn of(builtin: &Builtin) -> Option<&KernelMaker> {
         match &builtin.host {
             Some(HostItem::Kernel(maker)) => maker.downcast_ref(),
@@ -47,7 +47,7 @@ impl KernelMaker {
     }
 }
 
-/// What all kernels of a chain are built with.
+/// The context in which all kernels of a chain are built.
 #[derive(Clone, Copy)]
 pub(crate) struct Setting<'a> {
     /// The kernels that the program declares.
@@ -60,7 +60,7 @@ pub(crate) struct Setting<'a> {
 /// Builds the kernel of a call.
 ///
 /// # Errors
-/// What is wrong with the call, with its position.
+/// The fault of the call, with its position.
 pub(crate) fn build(
     call: &KernelCall,
     setting: Setting,

@@ -63,7 +63,7 @@ impl<'a> PlanEnv<'a> {
 /// Evaluates an expression.
 ///
 /// # Errors
-/// What went wrong, with its position.
+/// The fault, with its position.
 pub(crate) fn evaluate(f: &Formula, env: &mut PlanEnv) -> Result<Value, Box<RunError>> {
     match &f.kind {
         FormulaKind::Const(v) => Ok(v.clone()),

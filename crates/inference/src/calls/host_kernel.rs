@@ -50,7 +50,7 @@ impl KernelCall<'_> {
 /// Makes a host's kernel: evaluates all arguments, and leaves the rest to `make`.
 ///
 /// # Errors
-/// What is wrong with the call, with its position.
+/// The fault of the call, with its position.
 pub(crate) fn build_host_kernel<K: Kernel + 'static>(
     call: &mut Call,
     make: impl Fn(&mut KernelCall) -> Result<K, Fault>,

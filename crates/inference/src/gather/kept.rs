@@ -20,7 +20,7 @@ pub struct KeptTrace {
     pub trace: SavedTrace,
 }
 
-/// What is kept of a chain.
+/// The kept part of a chain.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Chain {
     draws: u64,

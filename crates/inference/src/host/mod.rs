@@ -109,7 +109,7 @@ impl Host {
         }
     }
 
-    /// What `pcadlang doc` says of a name: the host's own, or the language's. `None` also
+    /// The text of `pcadlang doc` for a name: the host's own, or the language's. `None` also
     /// where an entry is not valid.
     pub fn doc(&self, name: &str) -> Option<String> {
         doc::doc(&*self.table(&crate::table()).ok()?, name)

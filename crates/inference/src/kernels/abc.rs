@@ -44,7 +44,7 @@ pub struct Abc {
     distance: f64,
     /// The data that it is a distance from.
     observed: Option<Arc<Observed>>,
-    /// Whether the distance comes from a checkpoint; it then refers to the data that the
+    /// True if the distance comes from a checkpoint; it then refers to the data that the
     /// trace observes at the next step.
     loaded: bool,
     span: Span,

@@ -55,7 +55,7 @@ pub struct Drift {
     spreads: FxHashMap<u64, Spread>,
     /// By the hash of their addresses: the shape of choices that move together.
     shapes: FxHashMap<u64, Shape>,
-    /// Whether a joint move of warm-up made choices appear or vanish.
+    /// True if a joint move of warm-up made choices appear or vanish.
     structural: bool,
 }
 

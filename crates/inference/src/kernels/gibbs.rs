@@ -43,7 +43,7 @@ pub struct Gibbs {
 /// Properties of the weighed values of a choice.
 #[derive(Clone, Copy, Debug, Default)]
 struct Weighed {
-    /// Whether any of them changes the set of choices.
+    /// True if any of them changes the set of choices.
     structural: bool,
     failed: u32,
     /// The value whose proposal is pending.

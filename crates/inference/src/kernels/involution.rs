@@ -41,7 +41,7 @@ struct Mapped {
     is_continuous: bool,
 }
 
-/// What an execution maps: choices in the order of the body, then all auxiliary
+/// The coordinates of an execution's map: choices in the order of the body, then all auxiliary
 /// variables.
 fn mapped(played: &Played, trace: &Trace) -> Vec<Mapped> {
     let mut all = Vec::new();
@@ -85,7 +85,7 @@ fn with_numbers(v: &Value, numbers: &mut impl Iterator<Item = f64>) -> Value {
     }
 }
 
-/// Whether two values are equal up to rounding.
+/// True if two values are equal up to rounding.
 fn near(a: &Value, b: &Value) -> bool {
     let close = |a: f64, b: f64| (a - b).abs() <= TOLERANCE * (1.0 + a.abs().max(b.abs()));
     match (a, b) {
@@ -257,7 +257,7 @@ fn none(aside: &mut Trace) -> Option<Moved<'_>> {
     Some(Moved { choices: &[], aside })
 }
 
-/// Whether a value contains a NaN.
+/// True if a value contains a NaN.
 fn has_nan(x: &Datum) -> bool {
     match x {
         Datum::Num(x) => x.is_nan(),

@@ -233,7 +233,7 @@ impl Place {
         })
     }
 
-    /// Whether the mixture is defined in the same way for this choice in another state.
+    /// True if the mixture is defined in the same way for this choice in another state.
     fn is_alike(&self, other: &Place) -> bool {
         match (&self.form, &other.form) {
             (Form::Discrete { .. }, Form::Discrete { .. }) | (Form::Mixed, Form::Mixed) => true,
@@ -243,7 +243,7 @@ impl Place {
     }
 }
 
-/// Whether every part of a support is continuous; records which of its coordinates are
+/// True if every part of a support is continuous; records which of its coordinates are
 /// angles.
 fn is_continuous(support: &Support, angles: &mut Vec<bool>) -> bool {
     match support {

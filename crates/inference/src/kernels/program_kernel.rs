@@ -52,7 +52,7 @@ pub(super) struct Drawn {
     pub value: Value,
 }
 
-/// What a map assigns a new value to.
+/// The target of a map's assignment.
 #[derive(Clone, PartialEq)]
 pub(super) enum Image {
     Choice(Address, Target),
@@ -140,7 +140,7 @@ impl ProgramKernel {
         self.play(trace, at, AuxiliaryValues::Given(auxiliaries), Some(moved)).ok()
     }
 
-    /// Whether what the body proposes depends on its arguments alone, not on the state.
+    /// True if what the body proposes depends on its arguments alone, not on the state.
     pub fn ignores_the_state(&self) -> bool {
         fn given(g: &Given) -> bool {
             matches!(g, Given::Variable(_))

@@ -29,7 +29,7 @@ impl Shape {
         Shape { mean: vec![0.0; dimensions], products, count: 0, window, factor: None }
     }
 
-    /// Whether the parts have consistent sizes; those read from a checkpoint may not.
+    /// True if the parts have consistent sizes; those read from a checkpoint may not.
     pub fn fits(&self) -> bool {
         let d = self.mean.len();
         let factor = self.factor.as_ref().is_none_or(|f| (f.nrows(), f.ncols()) == (d, d));

@@ -182,7 +182,7 @@ impl Line<'_> {
         Ok((left, right))
     }
 
-    /// Whether doubling from `x` could have led to this interval: it must not have
+    /// True if doubling from `x` could have led to this interval: it must not have
     /// stopped at any of the intervals that halving towards `x` passes through (figure
     /// 6). If so, `x` is pending.
     fn leads_back(

@@ -65,7 +65,7 @@ pub struct Smc {
     accepted: Option<(f64, f64)>,
     /// The data observed then.
     observed: Option<Arc<Observed>>,
-    /// Whether the state comes from a checkpoint; it then refers to the data that the
+    /// True if the state comes from a checkpoint; it then refers to the data that the
     /// trace observes at the next step.
     loaded: bool,
     /// The number of estimates, and the log of their sum.

@@ -59,7 +59,7 @@ pub(super) enum ResumePoint {
         steps: usize,
         /// The address hash of the choice that its sweep has visited last.
         after: Option<u64>,
-        /// What its steps did.
+        /// The outcome of its steps.
         done: Outcome,
     },
 }

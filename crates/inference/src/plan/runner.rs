@@ -90,7 +90,7 @@ pub(super) struct Runner<'a> {
     /// Where a checkpoint resumes, the outermost statement first; empty once the chain
     /// has got there.
     pub resume_path: VecDeque<PlanPosition>,
-    /// Whether the plan is finished.
+    /// True if the plan is finished.
     pub finished: bool,
     /// The number of checkpoints requested so far.
     pub asked: u64,
@@ -427,7 +427,7 @@ impl<'a> Runner<'a> {
         flow
     }
 
-    /// Whether the run was cancelled: by its progress, whose flag is among those of the
+    /// True if the run was cancelled: by its progress, whose flag is among those of the
     /// limits, or by its callback.
     pub fn is_cancelled(&self) -> bool {
         self.options.limits.stop.is_set()
@@ -443,7 +443,7 @@ impl<'a> Runner<'a> {
         self.trace.set_limits(Limits { stop, ..limits });
     }
 
-    /// Whether the run, or its warm-up, has used up its steps or time.
+    /// True if the run, or its warm-up, has used up its steps or time.
     pub fn is_over(&self) -> bool {
         if self.is_cancelled() {
             return true;

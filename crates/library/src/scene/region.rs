@@ -89,7 +89,7 @@ thread_local! {
 }
 
 impl RegionOf {
-    /// Whether the likelihood depends on the silhouette only.
+    /// True if the likelihood depends on the silhouette only.
     fn outline(&self) -> bool {
         channel(self.groups, &self.options) == Channel::Depth
     }

@@ -40,7 +40,7 @@ pub struct ChamferOptions {
     /// Standard deviation of the distance, in percent of the diagonal, above 0. Default
     /// 0.4.
     pub sigma: f64,
-    /// Whether to score the mean distance or to sum scores. Default mean.
+    /// The mean distance, or a sum of scores. Default mean.
     pub mode: Mode,
     /// Also measures from the observed contours to the rendered ones: the distance is the
     /// mean of both directions' means (`Sum`: both directions' scores are added). Of more
@@ -150,7 +150,7 @@ impl ChamferSums {
     }
 }
 
-/// What the sums of one direction are computed from, for a device that computes them.
+/// The input to the sums of one direction, for a device that computes them.
 #[derive(Debug, Clone, Copy)]
 pub struct DistanceField<'a> {
     /// Distances in percent of the diagonal, row by row; one field, or one for each of as

@@ -370,7 +370,7 @@ struct Assignment {
     length: i64,
     score: i64,
     matched: i64,
-    /// Whether anything was ever assigned, and whether anything was since the last update
+    /// True if anything was ever assigned, and whether anything was since the last update
     /// of `matched`.
     known: bool,
     open: bool,

@@ -214,7 +214,7 @@ impl Query {
         self.weights.len()
     }
 
-    /// Whether there are no features.
+    /// True if there are no features.
     pub fn is_empty(&self) -> bool {
         self.weights.is_empty()
     }

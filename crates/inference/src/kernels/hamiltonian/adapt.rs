@@ -39,7 +39,7 @@ const WINDOW: u32 = 25;
 pub(super) struct Adaptation {
     /// The target acceptance rate.
     target: f64,
-    /// What the metric belongs to: addresses and their numbers of coordinates.
+    /// The coordinates of the metric: addresses and their numbers of coordinates.
     signature: Vec<(u64, usize)>,
     pub inverse_mass: Vec<f64>,
     /// By address, the inverse masses from the last windows. Choices that disappear and

@@ -41,7 +41,7 @@ pub(super) struct End {
     /// The mean acceptance probability along the trajectory, from which the step size is
     /// adapted.
     pub acceptance: f64,
-    /// Whether the trajectory reached a point where the program is undefined.
+    /// True if the trajectory reached a point where the program is undefined.
     pub failed: bool,
     pub divergent: bool,
 }

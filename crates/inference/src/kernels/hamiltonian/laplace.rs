@@ -72,7 +72,7 @@ impl Laplace {
         y
     }
 
-    /// Whether the parts are consistent; those read from a checkpoint may not be.
+    /// True if the parts are consistent; those read from a checkpoint may not be.
     pub fn is_sound(&self) -> bool {
         let n = self.mean.len();
         let finite = self.mean.iter().chain(&self.axes).all(|x| x.is_finite());

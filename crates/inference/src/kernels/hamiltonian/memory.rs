@@ -1,4 +1,4 @@
-//! What a Hamiltonian kernel keeps between steps: the tape of the density, and points and
+//! The memory of a Hamiltonian kernel between steps: the tape of the density, and points and
 //! lists for reuse.
 //!
 //! A tape is valid for one state of a trace, up to the kernel's own choices. If other
@@ -57,7 +57,7 @@ impl Layout {
     }
 }
 
-/// What a checkpoint records about the tape.
+/// The tape as a checkpoint records it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 enum Kept {
     #[default]

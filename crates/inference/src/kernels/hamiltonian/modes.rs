@@ -221,7 +221,7 @@ impl Climb {
         Climb { state, discrete: Vec::new(), y: Vec::new(), height, past: Past::new() }
     }
 
-    /// Whether it ended at the same mode as a higher climb. Modes that are mirror images
+    /// True if it ended at the same mode as a higher climb. Modes that are mirror images
     /// have equal heights but other coordinates.
     fn is_that_of(&self, higher: &Climb) -> bool {
         higher.height - self.height < SAME.0

@@ -56,7 +56,7 @@ struct Tree {
     sum: Arc<Vec<f64>>,
     proposal: Arc<Point>,
     log_weight: f64,
-    /// Whether it makes a U-turn or diverges.
+    /// True if it makes a U-turn or diverges.
     stop: bool,
 }
 
@@ -130,7 +130,7 @@ impl Walk<'_, '_> {
     }
 }
 
-/// Whether the velocity at one of the ends no longer points along the sum of the momenta,
+/// True if the velocity at one of the ends no longer points along the sum of the momenta,
 /// which is given as two partial sums.
 fn turning(a: &Point, b: &Point, some: &[f64], more: &[f64]) -> bool {
     let (mut first, mut last) = (0.0, 0.0);

@@ -21,7 +21,7 @@ use pcadlang_numerics::num::log_sum_exp;
 use pcadlang_numerics::rng::Stream;
 use std::sync::Arc;
 
-/// What a system sums out.
+/// The choices that a system sums out.
 #[derive(Debug)]
 pub(super) struct Summed {
     marginal: Marginal,

@@ -20,7 +20,7 @@ pub(super) struct System<'a> {
     at: &'a StepContext,
     memory: &'a mut Memory,
     layout: Arc<Layout>,
-    /// Whether the memory has a tape of the trace's state.
+    /// True if the memory has a tape of the trace's state.
     taped: bool,
     jacobian: f64,
     summed: Option<Summed>,

@@ -29,7 +29,7 @@ impl Area {
         (count > 0).then_some(Area { pixels, count, bounds })
     }
 
-    /// Whether the intersection over union with another set of the same picture is above
+    /// True if the intersection over union with another set of the same picture is above
     /// a threshold.
     pub fn overlaps(&self, other: &Area, threshold: f64) -> bool {
         // The ratio of the sizes is an upper bound.
@@ -61,7 +61,7 @@ impl Area {
         self.pixels.points()
     }
 
-    /// Whether the pixel at a position is on; false outside the picture.
+    /// True if the pixel at a position is on; false outside the picture.
     pub fn at(&self, x: f64, y: f64) -> bool {
         let (width, height) = (self.pixels.width as f64, self.pixels.height as f64);
         let inside = x >= 0.0 && y >= 0.0 && x < width && y < height;

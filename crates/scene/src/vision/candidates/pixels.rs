@@ -49,7 +49,7 @@ impl Pixels {
         &self.words
     }
 
-    /// Whether the pixel in column `i` of row `j` is on.
+    /// True if the pixel in column `i` of row `j` is on.
     pub fn has(&self, i: usize, j: usize) -> bool {
         self.words[j * self.stride() + i / 64] >> (i % 64) & 1 == 1
     }
@@ -84,7 +84,7 @@ impl Pixels {
         })
     }
 
-    /// Whether each pixel is on, in row-major order.
+    /// The pixels in row-major order, true if on.
     pub fn bools(&self) -> Vec<bool> {
         let row = |j: usize| (0..self.width).map(move |i| self.has(i, j));
         (0..self.height).flat_map(row).collect()

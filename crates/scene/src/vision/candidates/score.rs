@@ -84,7 +84,7 @@ impl Scorer<'_> {
 pub struct Scored {
     pub score: f64,
     pub area: Area,
-    /// Whether the score is only a bound so far.
+    /// True if the score is only a bound so far.
     bound: bool,
 }
 

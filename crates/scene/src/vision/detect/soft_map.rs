@@ -6,7 +6,7 @@ use crate::vision::detect::gradient::{EdgePoint, Gradient, colour_gradient, smoo
 use crate::vision::pictures::contour_map::ContourMap;
 use crate::vision::pictures::photo::{Photo, fitted};
 
-/// What a map shows.
+/// The content of a map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Shows {
     /// The probability that a pixel is on a contour.

@@ -76,7 +76,7 @@ const SIMPLE: [bool; 256] = {
     table
 };
 
-/// Whether a pixel is the end of a line rather than of a spur: it has one neighbour, or
+/// True if a pixel is the end of a line rather than of a spur: it has one neighbour, or
 /// two adjacent ones, which are neither much stronger nor farther inside.
 fn is_end(k: usize, ring: u8, around: &[usize; 8], strength: &[u8], depth: &[f32]) -> bool {
     let close = ring & ring.rotate_left(1) != 0;

@@ -108,7 +108,7 @@ pub struct KeypointLikelihood {
     log_area: f64,
 }
 
-/// What the density of a detection needs, wherever the joint is.
+/// The terms of a detection's density that do not depend on the joint.
 #[derive(Clone, Debug)]
 pub struct DetectionConstants {
     /// Per position, the logs of its components at the joint.

@@ -136,12 +136,12 @@ impl Keypoints {
         &self.points
     }
 
-    /// Whether there are no joints.
+    /// True if there are no joints.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
 
-    /// Whether positions are fractions of the image's width and height, as in MediaPipe's
+    /// True if positions are fractions of the image's width and height, as in MediaPipe's
     /// files.
     pub fn is_normalised(&self) -> bool {
         self.normalised

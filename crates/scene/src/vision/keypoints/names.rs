@@ -85,7 +85,7 @@ fn well_known(name: &str) -> bool {
     MEDIAPIPE.contains(&name) || MORE.contains(&name)
 }
 
-/// Whether a rig need not have this joint: the well-known ones except those of arms and
+/// True if a rig need not have this joint: the well-known ones except those of arms and
 /// legs.
 pub(super) fn may_lack(name: &str) -> bool {
     let limb = ["shoulder", "elbow", "wrist", "hip", "knee", "ankle"];

@@ -7,7 +7,7 @@ use std::fmt;
 /// An error in keypoints.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KeypointsError {
-    /// What is wrong, with the path in the file.
+    /// The fault, with the path in the file.
     pub message: String,
     /// How to fix it.
     pub hint: Option<String>,

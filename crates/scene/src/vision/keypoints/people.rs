@@ -35,7 +35,7 @@ impl People {
         self.all.len()
     }
 
-    /// Whether the file has no people.
+    /// True if the file has no people.
     pub fn is_empty(&self) -> bool {
         self.all.is_empty()
     }

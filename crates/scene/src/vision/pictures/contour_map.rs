@@ -51,7 +51,7 @@ impl ContourMap {
         self.x.len()
     }
 
-    /// Whether there are no points.
+    /// True if there are no points.
     pub fn is_empty(&self) -> bool {
         self.x.is_empty()
     }

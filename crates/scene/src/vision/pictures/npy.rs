@@ -58,7 +58,7 @@ fn bad(text: impl Into<String>) -> VisionError {
     VisionError::Npy(text.into())
 }
 
-/// Whether bytes begin with the magic number of a `.npy` file.
+/// True if bytes begin with the magic number of a `.npy` file.
 pub fn is_npy(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\x93NUMPY")
 }

@@ -205,7 +205,7 @@ fn format_of(bytes: &[u8]) -> Result<ImageFormat, VisionError> {
     }
 }
 
-/// Whether a JPEG file has an end marker after the start of its first scan (thumbnails in
+/// True if a JPEG file has an end marker after the start of its first scan (thumbnails in
 /// the metadata have theirs before). The decoder silently fills missing data with grey.
 fn jpeg_ends(bytes: &[u8]) -> bool {
     let mut at = 2;

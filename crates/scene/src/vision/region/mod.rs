@@ -71,7 +71,7 @@ impl RegionOptions {
         check("shading", "at least 0", self.shading, self.shading >= 0.0)
     }
 
-    /// Whether the score is a normalised distribution over quantised pictures: one of the
+    /// True if the score is a normalised distribution over quantised pictures: one of the
     /// two terms has power 1, and nothing else counts.
     pub fn is_proper(&self) -> bool {
         let tiles = if self.tiles == 0 { 0.0 } else { self.tile_power };

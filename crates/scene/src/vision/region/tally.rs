@@ -27,7 +27,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Whether all is background.
+    /// True if all is background.
     pub(super) fn is_empty(&self) -> bool {
         self.inside == 0
     }
