@@ -55,7 +55,7 @@ fn sound(a: &Armature) {
                 && i.weights.iter().all(|w| *w >= 0.0)
         );
     }
-    let rest = posed_vertices(&a, &[]);
+    let rest = posed_vertices(a, &[]);
     assert!(rest.iter().zip(a.positions()).all(|(p, q)| (*p - q.as_dvec3()).length() < 1e-6));
     for (j, k) in a.rig().joints().iter().zip(a.rig().keypoints()) {
         assert!(j.name == k.name && j.head == k.rest);

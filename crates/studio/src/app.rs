@@ -61,8 +61,9 @@ impl App {
                 self.sessions.close(c.session)?;
                 json!({})
             }
-            Call::Replace(r) => self
-                .change(r.session, move |open| Ok(open.session.replace(&r.text).map(|_| ())?))?,
+            Call::Replace(r) => {
+                self.change(r.session, move |open| open.session.replace(&r.text).map(|_| ()))?
+            }
             Call::Observe(o) => {
                 self.permit(&o.observe)?;
                 self.change(o.session, move |open| open.observe(o.observe, Stop::default()))?

@@ -52,14 +52,14 @@ pub fn repl(a: &Repl) -> Result<(), Failure> {
 
 fn open(a: &Repl, stop: Stop) -> Result<(Session, Reply), Failure> {
     let Some(path) = &a.program else {
-        return Session::new(a.seed, stop).map(|s| (s, Reply::default())).map_err(Failure::from);
+        return Session::new(a.seed, stop).map(|s| (s, Reply::default()));
     };
     if Path::new(path).join("run.json").is_file() {
         return Reopened::open(Path::new(path))?.session(a.seed, stop);
     }
     let job = job(a, path);
     let (program, _) = inputs::observe(inputs::program(&job.inputs, false)?, &job)?;
-    Ok(Session::open(program, a.seed, stop)?)
+    Session::open(program, a.seed, stop)
 }
 
 /// Returns the equivalent arguments of `run`.
@@ -241,7 +241,7 @@ impl Front {
         let replaced = self.session.borrow_mut().replace(&edited);
         self.draft = replaced.is_err().then_some(edited);
         // Errors in the text have their own messages; any other error gets the hint.
-        Ok(replaced.map_err(|t| t.hint("`:edit` goes on with the text as you left it"))?)
+        replaced.map_err(|t| t.hint("`:edit` goes on with the text as you left it"))
     }
 }
 
