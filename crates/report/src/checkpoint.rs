@@ -93,7 +93,7 @@ pub fn text_hash(text: &str) -> String {
     bytes_hash(text.as_bytes())
 }
 
-/// Does the same as [`text_hash`](super::text_hash) for arbitrary bytes.
+/// Does the same as [`text_hash`] for arbitrary bytes.
 pub fn bytes_hash(bytes: &[u8]) -> String {
     format!("{:016x}", fnv1a(bytes))
 }
