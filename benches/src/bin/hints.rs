@@ -1,0 +1,272 @@
+//! Measures how well objects of real photographs are found by what the user points out:
+//! nothing, a click, a box, an axis, eight clicks around the outline, a mask.
+//!
+//!     cargo run --release -p pcadlang-benches --bin hints -- FOLDER [kinds=none,at,box,axis,outline,mask]
+//!         [seeds=1,2,3] [time=5s] [out=DIR] [program=lathe.pcad] [cases=NAME,…] [set:NAME=VALUE]
+//!
+//! A subfolder of FOLDER holds `image.png` and the true `mask.png`. Hints are derived from
+//! the true mask with noise, which depends on the folder's name only: the sides of a box
+//! are off by up to 8 % of its width or height (uniform); foot, top and width of an axis
+//! by 3 % of its length (normal); eight clicks around the outline, at equal arc lengths,
+//! by 2 % of the longer side of its box (normal); a click is a random pixel of the mask
+//! that is at least half as far from the outline as the furthest one. The release binary
+//! of the command runs each case.
+//!
+//! Prints for each case the median intersection over union of the fitted and the true mask
+//! over the seeds, and whether the top is towards (+) or away from the camera (-) in each;
+//! then the mean and the median of the cases and how many reach 0.8.
+
+use pcadlang_numerics::rng::{Purpose, Stream, StreamKey};
+use pcadlang_scene::vision::segmentation::mask_axes;
+use pcadlang_scene::vision::{Limits, Mask, distance_transform, mask, photo};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const KINDS: [&str; 6] = ["none", "at", "box", "axis", "outline", "mask"];
+/// Noise of hints: uniform for boxes, otherwise the standard deviation of a normal one.
+const BOX: f64 = 0.08;
+const AXIS: f64 = 0.03;
+const OUTLINE: f64 = 0.02;
+const CLICKS: usize = 8;
+
+/// What is measured.
+struct Settings {
+    folder: PathBuf,
+    kinds: Vec<String>,
+    seeds: Vec<u64>,
+    time: String,
+    out: PathBuf,
+    program: String,
+    cases: Vec<String>,
+    sets: Vec<String>,
+}
+
+fn settings() -> Result<Settings, String> {
+    let mut s = Settings {
+        folder: PathBuf::new(),
+        kinds: KINDS.map(String::from).to_vec(),
+        seeds: vec![1, 2, 3],
+        time: "5s".into(),
+        out: std::env::temp_dir().join("pcadlang-hints"),
+        program: "lathe.pcad".into(),
+        cases: Vec::new(),
+        sets: Vec::new(),
+    };
+    let list = |text: &str| text.split(',').map(String::from).collect::<Vec<_>>();
+    for argument in std::env::args().skip(1) {
+        match argument.split_once('=') {
+            Some(("kinds", v)) => s.kinds = list(v),
+            Some(("seeds", v)) => s.seeds = list(v).iter().filter_map(|x| x.parse().ok()).collect(),
+            Some(("time", v)) => s.time = v.into(),
+            Some(("out", v)) => s.out = v.into(),
+            Some(("program", v)) => s.program = v.into(),
+            Some(("cases", v)) => s.cases = list(v),
+            Some((name, v)) if name.starts_with("set:") => {
+                s.sets.push(format!("{}={v}", &name[4..]))
+            }
+            _ => s.folder = argument.into(),
+        }
+    }
+    match s.folder.is_dir() {
+        true => Ok(s),
+        false => Err("usage: hints FOLDER [kinds=…] [seeds=…] [time=…] [out=…]".into()),
+    }
+}
+
+/// A picture with its true mask.
+struct Case {
+    name: String,
+    image: PathBuf,
+    truth: PathBuf,
+    mask: Mask,
+}
+
+fn cases(s: &Settings) -> Result<Vec<Case>, String> {
+    let text = |e: std::io::Error| e.to_string();
+    let mut all = Vec::new();
+    for entry in std::fs::read_dir(&s.folder).map_err(text)? {
+        let folder = entry.map_err(text)?.path();
+        let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let (image, truth) = (folder.join("image.png"), folder.join("mask.png"));
+        let wanted = s.cases.is_empty() || s.cases.contains(&name);
+        if wanted && image.exists() && truth.exists() {
+            let mask = read_mask(&truth)?;
+            all.push(Case { name, image, truth, mask });
+        }
+    }
+    all.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(all)
+}
+
+fn read_mask(path: &Path) -> Result<Mask, String> {
+    let bytes = std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    mask::decode(&bytes, &Limits::default()).map_err(|e| e.to_string())
+}
+
+/// Left, top, width and height of a mask, pixels.
+fn bounds(m: &Mask) -> [f64; 4] {
+    let (mut least, mut most) = ([u32::MAX; 2], [0; 2]);
+    for (i, _) in m.data().iter().enumerate().filter(|(_, on)| **on) {
+        let at = [i as u32 % m.width(), i as u32 / m.width()];
+        for k in 0..2 {
+            least[k] = least[k].min(at[k]);
+            most[k] = most[k].max(at[k] + 1);
+        }
+    }
+    [least[0], least[1], most[0] - least[0], most[1] - least[1]].map(f64::from)
+}
+
+/// The outline of the component of the first pixel of a mask: the corners between pixels,
+/// with the object on the right.
+fn outline(m: &Mask) -> Vec<[f64; 2]> {
+    let (w, h) = (m.width() as i64, m.height() as i64);
+    let on = |x: i64, y: i64| {
+        x >= 0 && y >= 0 && x < w && y < h && m.data()[(y * w + x) as usize]
+    };
+    let Some(first) = m.data().iter().position(|on| *on) else { return Vec::new() };
+    let start = [first as i64 % w, first as i64 / w];
+    let (mut at, mut step, mut corners) = (start, [1, 0], Vec::new());
+    loop {
+        corners.push(at.map(|x| x as f64));
+        at = [at[0] + step[0], at[1] + step[1]];
+        // The pixels ahead on the left and on the right.
+        let ahead = |side: i64| {
+            let x = 2 * at[0] + step[0] - side * step[1] - 1;
+            let y = 2 * at[1] + step[1] + side * step[0] - 1;
+            on(x.div_euclid(2), y.div_euclid(2))
+        };
+        step = match (ahead(-1), ahead(1)) {
+            (true, _) => [step[1], -step[0]],
+            (false, true) => step,
+            (false, false) => [-step[1], step[0]],
+        };
+        if at == start {
+            return corners;
+        }
+    }
+}
+
+/// The arguments of a hint.
+fn hint(kind: &str, case: &Case) -> Result<Vec<String>, String> {
+    let site = case.name.bytes().fold(7, |h: u64, b| h.wrapping_mul(31).wrapping_add(b.into()));
+    let mut rng: Stream = StreamKey::new(1, 0, Purpose::TRUTH).stream(0, site, 0);
+    let m = &case.mask;
+    let [x, y, w, h] = bounds(m);
+    let point = |[x, y]: [f64; 2]| format!("{x:.1},{y:.1}");
+    Ok(match kind {
+        "none" => Vec::new(),
+        "mask" => vec!["--mask".into(), case.truth.display().to_string()],
+        "box" => {
+            let mut off = |side: f64| BOX * side * (2.0 * rng.uniform() - 1.0);
+            let [l, t, r, b] = [x + off(w), y + off(h), x + w + off(w), y + h + off(h)];
+            let (most_x, most_y) = (f64::from(m.width()), f64::from(m.height()));
+            let ([l, t], [r, b]) = ([l.max(0.0), t.max(0.0)], [r.min(most_x), b.min(most_y)]);
+            vec!["--box".into(), format!("{l:.1},{t:.1},{:.1},{:.1}", r - l, b - t)]
+        }
+        "at" => {
+            let outside: Vec<bool> = m.data().iter().map(|on| !on).collect();
+            let away = distance_transform(m.width(), m.height(), &outside).values;
+            let most = away.iter().copied().fold(0.0, f32::max);
+            let deep: Vec<usize> = (0..away.len()).filter(|i| away[*i] >= 0.5 * most).collect();
+            let i = deep[rng.index(deep.len())];
+            let (column, row) = (i % m.width() as usize, i / m.width() as usize);
+            vec!["--at".into(), format!("{column}.5,{row}.5")]
+        }
+        "outline" => {
+            let corners = outline(m);
+            let first = rng.index(corners.len());
+            let mut arguments = vec!["--outline".into()];
+            for k in 0..CLICKS {
+                let [cx, cy] = corners[(first + k * corners.len() / CLICKS) % corners.len()];
+                let mut off = || OUTLINE * w.max(h) * rng.standard_normal();
+                arguments.push(point([cx + off(), cy + off()]));
+            }
+            arguments
+        }
+        "axis" => {
+            let bytes = std::fs::read(&case.image).map_err(|e| e.to_string())?;
+            let photo = photo::decode(&bytes, &Limits::default()).map_err(|e| e.to_string())?;
+            let axes = mask_axes(&photo, m);
+            // Of nearly equally good axes, the more upright one is the user's.
+            let best = axes.iter().map(|a| a.symmetry).fold(0.0, f64::max);
+            let lean = |a: &&pcadlang_scene::vision::candidates::Axis| {
+                ((a.top[0] - a.foot[0]) / (a.foot[1] - a.top[1])).abs()
+            };
+            let good = axes.iter().filter(|a| a.symmetry > best - 0.04);
+            let axis = good.min_by(|a, b| lean(a).total_cmp(&lean(b))).ok_or("no axis")?;
+            let length = f64::hypot(axis.top[0] - axis.foot[0], axis.top[1] - axis.foot[1]);
+            let mut off = || AXIS * length * rng.standard_normal();
+            let width = 2.0 * axis.widths.iter().copied().fold(0.0, f64::max) + off();
+            let [foot, top] = [axis.foot, axis.top].map(|p| point([p[0] + off(), p[1] + off()]));
+            vec!["--axis".into(), foot, top, format!("{width:.1}")]
+        }
+        _ => return Err(format!("{kind} is none of {}", KINDS.join(", "))),
+    })
+}
+
+/// Runs a case, and returns the overlap and the component of the axis towards the camera.
+fn run(s: &Settings, kind: &str, case: &Case, seed: u64) -> Result<(f64, f64), String> {
+    let binary = std::env::current_exe().map_err(|e| e.to_string())?.with_file_name("pcadlang");
+    let out = s.out.join(format!("{kind}-{seed}")).join(&case.name);
+    let sets = s.sets.iter().flat_map(|set| ["--set".to_owned(), set.clone()]);
+    let ran = Command::new(binary)
+        .args(["run", &s.program, "--quiet", "--quality", "own", "--time", &s.time])
+        .args(["--seed", &seed.to_string(), "--threads", "2"])
+        .arg("--observe")
+        .arg(&case.image)
+        .arg("--out")
+        .arg(&out)
+        .args(sets)
+        .args(hint(kind, case)?)
+        .output()
+        .map_err(|e| e.to_string())?;
+    if !ran.status.success() {
+        return Err(format!("{}: {}", case.name, String::from_utf8_lossy(&ran.stderr)));
+    }
+    let fit = read_mask(&out.join("mask.png"))?.resized(case.mask.width(), case.mask.height());
+    let pairs = || fit.data().iter().zip(case.mask.data());
+    let both = pairs().filter(|(a, b)| **a && **b).count();
+    let either = pairs().filter(|(a, b)| **a || **b).count().max(1);
+    Ok((both as f64 / either as f64, toward(&out).unwrap_or(0.0)))
+}
+
+/// The axis of the best state towards the camera.
+fn toward(out: &Path) -> Option<f64> {
+    let text = std::fs::read_to_string(out.join("best.trace.json")).ok()?;
+    let trace: serde_json::Value = serde_json::from_str(&text).ok()?;
+    let choices = trace["choices"].as_array()?;
+    let tilt = choices.iter().find(|c| c["address"] == "@S_L/place/r[x]")?;
+    tilt["value"].as_f64()
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    if n == 0 { f64::NAN } else { 0.5 * (values[(n - 1) / 2] + values[n / 2]) }
+}
+
+fn main() -> Result<(), String> {
+    let s = settings()?;
+    let cases = cases(&s)?;
+    for kind in &s.kinds {
+        let mut medians = Vec::new();
+        for case in &cases {
+            let runs = s.seeds.iter().map(|seed| run(&s, kind, case, *seed));
+            let runs = runs.collect::<Result<Vec<_>, String>>()?;
+            let signs: String = runs.iter().map(|(_, t)| if *t > 0.0 { '+' } else { '-' }).collect();
+            let mut overlaps: Vec<f64> = runs.iter().map(|(overlap, _)| *overlap).collect();
+            let shown: Vec<String> = overlaps.iter().map(|v| format!("{v:.2}")).collect();
+            let middle = median(&mut overlaps);
+            println!("{kind:8} {:28} {middle:.3}  {}  {signs}", case.name, shown.join(" "));
+            medians.push(middle);
+        }
+        let found = medians.iter().filter(|v| **v >= 0.8).count();
+        let mean = medians.iter().sum::<f64>() / medians.len().max(1) as f64;
+        let middle = median(&mut medians.clone());
+        println!(
+            "{kind}: mean {mean:.3}, median {middle:.2}, {found} of {} found (0.8)",
+            medians.len()
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,164 @@
+//! Places in a photograph where an object of revolution may be: where the user points, in
+//! the boxes of a detector, or in regions that are nearly mirror-symmetric.
+
+use pcadlang_detectors::objects::{FindOptions, FoundObject, networks};
+use pcadlang_engine::lang::error::{Fault, FaultKind};
+use pcadlang_scene::vision::candidates::{Axis, Candidate, CandidateOptions, candidates};
+use pcadlang_scene::vision::segmentation::{Guess, Method, guesses, mask_axes};
+use pcadlang_scene::vision::{Hint, Mask, Photo};
+
+/// The classes of COCO that are objects of revolution.
+const ROUND: [&str; 7] = ["bottle", "wine glass", "cup", "bowl", "apple", "orange", "vase"];
+/// The maximum number of boxes of the detector.
+const BOXES: usize = 3;
+/// The minimum score of a box, and of one that a click points out.
+const LEAST: f32 = 0.2;
+const LEAST_CLICKED: f32 = 0.05;
+/// The weight of all regions together, beside boxes.
+const REGIONS: f64 = 0.25;
+/// Each side of the picture that a box touches multiplies its weight by this.
+const CUT_OFF: f64 = 0.6;
+
+/// A place where an object may be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Place {
+    /// Its prior probability.
+    pub score: f64,
+    /// What points to it: a part of the hint (`drawn`, `axis`, `box`), the class that the
+    /// detector sees, or `region`.
+    pub source: String,
+    /// Left, top, width and height, pixels of the photograph, if a box points to it.
+    pub bounds: Option<[f64; 4]>,
+    /// Outlines: the one that the user drew, or guesses.
+    pub masks: Vec<Mask>,
+    /// Axes with their weights, which add up to 1.
+    pub axes: Vec<(Axis, f64)>,
+}
+
+impl Place {
+    fn guessed(source: &str, score: f64, bounds: Option<[f64; 4]>, all: &[Guess]) -> Place {
+        let first = |method| all.iter().find(|g| g.method == method).map(|g| g.mask.clone());
+        let masks = [Method::Symmetric, Method::Cut].into_iter().filter_map(first).collect();
+        // Each method has the same weight; later guesses and axes of one have half the
+        // weight of the one before.
+        let weighted = |method| {
+            let axes = all.iter().filter(move |g| g.method == method).flat_map(|g| &g.axes);
+            axes.enumerate().map(|(i, axis)| (axis.clone(), 0.5f64.powi(i as i32)))
+        };
+        let methods = [Method::Symmetric, Method::Cut, Method::Ellipse];
+        let axes = methods.into_iter().flat_map(weighted).collect();
+        Place { score, source: source.into(), bounds, masks, axes: normalised(axes) }
+    }
+
+    fn region(c: &Candidate, score: f64) -> Place {
+        let weights = [0.8, 0.2].into_iter();
+        Place {
+            score,
+            source: "region".into(),
+            bounds: None,
+            masks: Vec::new(),
+            axes: normalised(c.axes.iter().cloned().zip(weights).collect()),
+        }
+    }
+}
+
+fn normalised(mut axes: Vec<(Axis, f64)>) -> Vec<(Axis, f64)> {
+    let total: f64 = axes.iter().map(|(_, w)| w).sum();
+    axes.iter_mut().for_each(|(_, w)| *w /= total);
+    axes
+}
+
+/// Returns the places of a photograph that a hint leaves open, the most probable first.
+///
+/// # Errors
+/// Those of the detector.
+pub fn places(photo: &Photo, hint: &Hint, options: &CandidateOptions) -> Result<Vec<Place>, Fault> {
+    if let Some(mask) = hint.drawn(photo.width(), photo.height()) {
+        let axes = mask_axes(photo, &mask).into_iter().zip([0.8, 0.2]).collect();
+        let (source, bounds) = ("drawn".into(), None);
+        let masks = vec![mask];
+        return Ok(vec![Place { score: 1.0, source, bounds, masks, axes: normalised(axes) }]);
+    }
+    if hint.axis.is_some() || hint.bounds.is_some() {
+        let source = if hint.axis.is_some() { "axis" } else { "box" };
+        return Ok(vec![Place::guessed(source, 1.0, hint.bounds, &guesses(photo, hint))]);
+    }
+    let boxes = boxes(photo, hint)?;
+    let seen = boxes.iter().map(|(o, weight)| {
+        let [l, t, r, b] = o.bounds;
+        let bounds = Some([l, t, r - l, b - t]);
+        let all = guesses(photo, &Hint { bounds, ..hint.clone() });
+        Place::guessed(o.class, *weight, bounds, &all)
+    });
+    let mut all: Vec<Place> = seen.collect();
+    let weight = |places: &[Place]| places.iter().map(|p| p.score).sum::<f64>();
+    let seen = weight(&all);
+    let regions = regions(photo, hint, options);
+    let total = regions.iter().map(|c| c.score).sum::<f64>().max(f64::MIN_POSITIVE);
+    // A click on a box that is seen leaves no doubt.
+    let share = match (all.is_empty(), hint.at.is_empty()) {
+        (true, _) => 1.0,
+        (false, true) => REGIONS,
+        (false, false) => 0.0,
+    };
+    all.iter_mut().for_each(|p| p.score *= (1.0 - share) / seen);
+    if share > 0.0 {
+        all.extend(regions.iter().map(|c| Place::region(c, share * c.score / total)));
+    }
+    Ok(all)
+}
+
+/// Returns the detector's boxes that may be meant, with their weights, the best first.
+fn boxes(photo: &Photo, hint: &Hint) -> Result<Vec<(FoundObject, f64)>, Fault> {
+    let fault = |why: String| Fault::new(FaultKind::Other, why);
+    let clicked = !hint.at.is_empty();
+    let least = if clicked { LEAST_CLICKED } else { LEAST };
+    let options = FindOptions { least, ..FindOptions::default() };
+    let finder = networks::finder().map_err(|why| fault(why.into()))?;
+    let found = finder.find(photo, &options).map_err(|e| fault(e.to_string()))?;
+    let inside = |o: &FoundObject, [x, y]: [f64; 2]| {
+        let [l, t, r, b] = o.bounds;
+        (l..=r).contains(&x) && (t..=b).contains(&y)
+    };
+    let meant = |o: &FoundObject| {
+        (clicked || ROUND.contains(&o.class))
+            && hint.at.iter().all(|p| inside(o, *p))
+            && !hint.not.iter().any(|p| inside(o, *p))
+    };
+    let (width, height) = (f64::from(photo.width()), f64::from(photo.height()));
+    let weight = |o: &FoundObject| {
+        let [l, t, r, b] = o.bounds;
+        if clicked {
+            return f64::from(o.score);
+        }
+        let off = [0.5 * (l + r) / width - 0.5, 0.5 * (t + b) / height - 0.5];
+        let central = libm::exp(-2.0 * (off[0] * off[0] + off[1] * off[1]));
+        let area = (r - l) * (b - t) / (width * height);
+        let touched = [l < 0.01 * width, t < 0.01 * height, r > 0.99 * width, b > 0.99 * height];
+        let cut_off = touched.into_iter().filter(|t| *t).map(|_| CUT_OFF).product::<f64>();
+        f64::from(o.score) * central * area.sqrt().sqrt() * cut_off
+    };
+    let mut all: Vec<(FoundObject, f64)> =
+        found.into_iter().filter(meant).map(|o| (o.clone(), weight(&o))).collect();
+    all.sort_by(|a, b| b.1.total_cmp(&a.1));
+    all.truncate(BOXES);
+    Ok(all)
+}
+
+/// Returns the regions that may be meant.
+fn regions(photo: &Photo, hint: &Hint, options: &CandidateOptions) -> Vec<Candidate> {
+    let mut all = candidates(photo, options);
+    let has = |c: &Candidate, [x, y]: [f64; 2]| {
+        let (w, h) = (c.mask.width(), c.mask.height());
+        let column = (x / f64::from(photo.width()) * f64::from(w)) as u32;
+        let row = (y / f64::from(photo.height()) * f64::from(h)) as u32;
+        c.mask.data()[(row.min(h - 1) * w + column.min(w - 1)) as usize]
+    };
+    let meant = |c: &Candidate| {
+        hint.at.iter().all(|p| has(c, *p)) && !hint.not.iter().any(|p| has(c, *p))
+    };
+    if all.iter().any(meant) {
+        all.retain(meant);
+    }
+    all
+}
