@@ -64,6 +64,7 @@ pub fn job_of(program: &str, sets: &BTreeMap<String, String>, observe: &[String]
         edges: None,
         who: Default::default(),
         allowed: Default::default(),
+        hint: Default::default(),
     };
     let sampling = Sampling { seed: 1, ..Sampling::default() };
     Job { observe: observe.to_vec(), ..Job::of(inputs, sampling) }
