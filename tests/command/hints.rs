@@ -32,7 +32,7 @@ fn collected(f: &Folder, out: &str) -> Vec<(String, f64)> {
     let (names, first) = (lines.next().unwrap(), lines.next().unwrap());
     let all = names.split(',').zip(first.split(','));
     let all = all.map(|(n, x)| (n.to_owned(), x.parse::<f64>().unwrap()));
-    all.filter(|(n, _)| !["x", "draw", "step", "log_joint"].contains(&&**n)).collect()
+    all.filter(|(n, _)| n != "x" && !n.ends_with("__") && !n.starts_with("log_lik")).collect()
 }
 
 #[test]
