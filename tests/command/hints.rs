@@ -143,3 +143,43 @@ fn it_needs_one_photograph() {
     let two = ["run", "two.pcad", "--observe", "photo=disc.png", "--observe", "other=disc.png"];
     f.refuses(&[&two[..], &["--at", "1,2"]].concat(), "several are observed: photo, other");
 }
+
+/// The same person twice, side by side.
+#[test]
+fn it_chooses_the_person() {
+    let f = Folder::new("hints_people");
+    let skier = image::open("examples/images/skier.jpg").unwrap().to_rgb8();
+    let (width, height) = skier.dimensions();
+    let two = image::RgbImage::from_fn(2 * width, height, |x, y| *skier.get_pixel(x % width, y));
+    let program = "include \"std/scene.pcad\" as scene;
+        data photo: image;
+        let middle = fn(p) { p.box[0] + p.box[2] / 2 };
+        let first = middle(scene.people(photo)[0]);
+        let other = middle(scene.people(photo, hint = { at: [[first, PLACE]] })[0]);
+        assume x ~ normal(0, 1);
+        observe normal(x, 1) = 0;
+        infer { repeat 4 { mh(@x); collect x, first, other; } }";
+    let keypoints: Value = serde_json::from_str(
+        &std::fs::read_to_string("examples/images/skier.keypoints.json").unwrap(),
+    )
+    .unwrap();
+    let hip = &keypoints.get("keypoints").unwrap_or(&keypoints)["l_hip"];
+    let (x, y) = (hip[0].as_f64().unwrap(), hip[1].as_f64().unwrap());
+    f.write("two.pcad", program.replace("PLACE", &y.to_string())).write("two.png", png(two));
+    let left = |hint: &[&str]| {
+        let run =
+            ["run", "two.pcad", "--observe", "two.png", "--chains", "1", "--quiet", "--out", "o"];
+        f.succeeds(&[&run[..], hint].concat());
+        let found = collected(&f, "o");
+        std::fs::remove_dir_all(f.path().join("o")).unwrap();
+        assert!((found[0].1 - found[1].1).abs() < 1e-9, "the hint of the program is its own");
+        found[0].1 < f64::from(width)
+    };
+    let (here, there) = (format!("{x},{y}"), format!("{},{y}", x + f64::from(width)));
+    assert!(left(&["--at", &here]) && !left(&["--at", &there]));
+    assert!(left(&["--not", &there]) && !left(&["--not", &here]));
+    let half = |from: u32| format!("{from},0,{width},{height}");
+    assert!(left(&["--box", &half(0)]) && !left(&["--box", &half(width)]));
+    let beside = format!("{width},0 {},0 {},{height} {width},{height}", 2 * width, 2 * width);
+    assert!(!left(&["--outline", &beside]));
+}

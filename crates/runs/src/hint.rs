@@ -66,22 +66,29 @@ impl HintArgs {
             mask::decode(&files::read(path)?, &Limits::default())
                 .map_err(|e| plain(format!("{}: {e}", path.display())))
         });
-        let axis = match &self.axis[..] {
-            [] => None,
-            [foot, top, width] => match (&foot[..], &top[..], &width[..]) {
-                (&[x, y], &[u, v], &[width]) => Some(AxisHint { foot: [x, y], top: [u, v], width }),
-                _ => return Err(no_axis()),
-            },
-            _ => return Err(no_axis()),
-        };
         Ok(Hint {
             mask: mask.transpose()?,
             outline: self.outline.concat(),
             bounds: self.bounds,
-            axis,
+            axis: self.axis()?,
             at: self.at.clone(),
             not: self.not.clone(),
         })
+    }
+
+    /// Returns the axis.
+    ///
+    /// # Errors
+    /// If it is not two ends and a width.
+    pub fn axis(&self) -> Result<Option<AxisHint>, Failure> {
+        let parts: Vec<&[f64]> = self.axis.iter().map(|part| &part[..]).collect();
+        match parts[..] {
+            [] => Ok(None),
+            [&[x, y], &[u, v], &[width]] => Ok(Some(AxisHint { foot: [x, y], top: [u, v], width })),
+            _ => {
+                Err(plain("--axis needs the foot, the top and the width: --axis 100,220 104,40 80"))
+            }
+        }
     }
 
     /// Returns what draws depend on: the bytes of the mask's file, and the rest; nothing
@@ -136,10 +143,6 @@ impl HintArgs {
             None => Ok(()),
         }
     }
-}
-
-fn no_axis() -> Failure {
-    plain("--axis needs the foot, the top and the width: --axis 100,220 104,40 80")
 }
 
 /// Parses numbers between commas.
