@@ -9,7 +9,7 @@ use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pcadlang::Value;
 use pcadlang_library::scene::{ImageValue, data};
 use pcadlang_scene::render::Camera;
-use pcadlang_scene::vision::Photo;
+use pcadlang_scene::vision::{AxisHint, Hint, Limits, Mask, Photo, mask};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
@@ -96,6 +96,29 @@ impl Program {
             program = program.observe(&name, keypoints(path, &value, picture.as_deref())?);
         }
         Ok(self.changed(program))
+    }
+
+    /// Says where the object is in the photograph that was observed, in its pixels: `mask`, a path
+    /// or an array of height x width truth values; `outline`, at least three corners [x, y]; `box`,
+    /// [x, y, width, height]; `axis`, (foot, top, width) with two ends [x, y]; `at` and `not_`,
+    /// positions [x, y] on it and beside it. What is left out is not pointed out.
+    #[pyo3(signature = (
+        *, mask = None, outline = Vec::new(), r#box = None, axis = None, at = Vec::new(), not_ = Vec::new()
+    ))]
+    fn hint(
+        &self,
+        mask: Option<&Bound<'_, PyAny>>,
+        outline: Vec<[f64; 2]>,
+        r#box: Option<[f64; 4]>,
+        axis: Option<([f64; 2], [f64; 2], f64)>,
+        at: Vec<[f64; 2]>,
+        not_: Vec<[f64; 2]>,
+    ) -> PyResult<Program> {
+        let axis = axis.map(|(foot, top, width)| AxisHint { foot, top, width });
+        let mask = mask.map(drawn).transpose()?;
+        let hint = Hint { mask, outline, bounds: r#box, axis, at, not: not_ };
+        let hinted = self.program.clone().hint(hint);
+        hinted.map(|p| self.changed(p)).map_err(|f| plain(f.message))
     }
 
     /// Sets the camera of views that have none: a dictionary as in camera files, or the path of
@@ -250,6 +273,25 @@ fn image(value: &Bound<'_, PyAny>) -> PyResult<Value> {
     let rgb = image::RgbImage::from_raw(width, height, bytes);
     let rgb = rgb.ok_or_else(|| PyValueError::new_err("the image is too large"))?;
     Ok(Value::object(ImageValue::photo(Photo::from_rgb(rgb).map_err(plain)?)))
+}
+
+/// A mask of a file or an array.
+fn drawn(value: &Bound<'_, PyAny>) -> PyResult<Mask> {
+    if let Ok(path) = value.extract::<PathBuf>() {
+        return mask::decode(&std::fs::read(path)?, &Limits::default()).map_err(plain);
+    }
+    let array = value.py().import("numpy")?.call_method1("asarray", (value,))?;
+    let Ok(array) = array.cast_into::<PyArrayDyn<bool>>() else {
+        return Err(PyTypeError::new_err("a mask is a path, or an array of truth values"));
+    };
+    let &[height, width] = array.shape() else {
+        let shape = array.shape();
+        return Err(PyValueError::new_err(format!("a mask is height x width, not {shape:?}")));
+    };
+    let read = array.try_readonly().map_err(|e| PyValueError::new_err(e.to_string()))?;
+    let side =
+        |n: usize| u32::try_from(n).map_err(|_| PyValueError::new_err("the mask is too large"));
+    Mask::new(side(width)?, side(height)?, read.as_array().iter().copied().collect()).map_err(plain)
 }
 
 /// Keypoints of a file or dictionary.

@@ -57,6 +57,38 @@ def test_photographs_are_paths_pictures_and_arrays(images: Path) -> None:
         np.testing.assert_array_equal(other, drawn[0])
 
 
+def test_hints_reach_the_program() -> None:
+    text = """include "std/scene.pcad" as scene;
+        data photo: image;
+        let h = scene.hint(photo);
+        assume seen = concat(h.box, h.axis.foot, h.axis.top, [h.axis.width], h.at[0], h.not[1]);
+        assume n = len(h.outline) + if h.drawn { 1 } else { 0 };
+        assume x ~ normal(0, 1);"""
+    photo = np.zeros((40, 60, 3), np.uint8)
+    mask = np.zeros((20, 30), bool)
+    mask[5:10] = True
+    program = pcadlang.Program.parse(text).observe(photo=photo)
+    hinted = program.hint(
+        mask=mask,
+        outline=[[1, 1], [9, 1], [9, 9]],
+        box=[1, 2, 30, 20],
+        axis=([5, 30], [6, 3], 8),
+        at=np.array([[3, 4]]),
+        not_=[[50, 4], [51, 5]],
+    )
+    trace = hinted.compile().simulate()
+    np.testing.assert_array_equal(trace["seen"], [1, 2, 30, 20, 5, 30, 6, 3, 8, 3, 4, 51, 5])
+    assert trace["n"] == 4
+    with pytest.raises(ValueError, match="outside the photograph of 60 x 40"):
+        program.hint(at=[[3, 41]])
+    with pytest.raises(ValueError, match="proportions"):
+        program.hint(mask=mask.T)
+    with pytest.raises(TypeError, match="truth values"):
+        program.hint(mask=np.zeros((20, 30)))
+    with pytest.raises(ValueError, match="needs a photograph"):
+        pcadlang.Program.parse(text).hint(box=[1, 2, 3, 4])
+
+
 def test_wrong_photographs_are_errors(images: Path) -> None:
     program = pcadlang.Program.open("lathe.pcad")
     for wrong in [3, np.zeros((4, 4)), [1, 2], {"a": 1}]:

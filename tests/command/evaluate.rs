@@ -250,7 +250,7 @@ fn keypoints_of_a_detector() {
     );
     assert!(f.succeeds(&args).err.contains("1/2 two: already done\n2/2 one: already done"));
     f.write("found.json", r#"{"one": {"keypoints": {"hip": [0, 3]}}}"#);
-    f.refuses(&args, "one was run with different settings: picture, camera or keypoints");
+    f.refuses(&args, "one was run with different settings: picture, hint, camera or keypoints");
     f.refuses(
         &["evaluate", "p.pcad", "people", "--keypoints", "found.json", "--out", "x"],
         "no item of kind `keypoints`",
@@ -320,7 +320,7 @@ fn other_settings_are_an_error_that_names_them() {
     f.write("p.pcad", format!("{PROGRAM} // changed"));
     f.refuses(&base, "different settings: program");
     f.write("p.pcad", PROGRAM).write("data/b/image.png", picture(5.0));
-    f.refuses(&base, "out/b was run with different settings: picture, camera or keypoints");
+    f.refuses(&base, "out/b was run with different settings: picture, hint, camera or keypoints");
     let old = draws(&f, "out/b");
     f.succeeds(&with(&["--fresh"]));
     assert_ne!(draws(&f, "out/b"), old);

@@ -9,6 +9,7 @@ mod bank;
 mod cli;
 mod evaluate;
 mod guide;
+mod hints;
 mod lsp;
 mod newcomers;
 mod nothing_lost;

@@ -285,7 +285,7 @@ fn a_vanished_input() {
     std::fs::copy(folder.path().join("out/overlay.png"), folder.path().join("cup.png")).unwrap();
     let output = command(&["--resume"]);
     assert!(
-        said(&output).contains("it has a different picture, camera or keypoints"),
+        said(&output).contains("it has a different picture, hint, camera or keypoints"),
         "{}",
         said(&output)
     );

@@ -36,12 +36,23 @@ export interface Folder {
   sessions: number[];
 }
 
+/** Where the object is, in pixels of the photograph. */
+export interface Hint {
+  mask: string | null;
+  outline: [number, number][];
+  box: [number, number, number, number] | null;
+  axis: { foot: [number, number]; top: [number, number]; width: number } | null;
+  at: [number, number][];
+  not: [number, number][];
+}
+
 export interface Session {
   session: number;
   program: string;
   text: string;
   note: string | null;
   observe: string[];
+  hint: Hint;
   photo: { name: string; width: number; height: number } | null;
   data: { name: string; kind: string; given: boolean }[];
   params: { name: string; value: unknown; about?: string | null }[];

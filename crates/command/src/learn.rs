@@ -15,6 +15,7 @@ pub fn learn(a: &Learn) -> Result<(), Failure> {
     if !a.join.is_empty() {
         return bank::join(&a.join, &a.out).map_err(|e| told(a, e));
     }
+    a.inputs.hint.none_for("learn")?;
     let model = inputs::program(&a.inputs, a.quiet)?.without_data().compile()?;
     let size = a.features_size;
     let features = match (&a.features_from, a.features) {

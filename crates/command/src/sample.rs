@@ -14,6 +14,7 @@ use std::sync::Arc;
 
 /// Draws scenes from the prior; a program without a scene gets a table of its values.
 pub fn sample(a: &Sample) -> Result<(), Failure> {
+    a.inputs.hint.none_for("sample")?;
     let model = inputs::program(&a.inputs, false)?.without_data().compile()?;
     let mut pictures = Vec::new();
     let mut rows = Vec::new();

@@ -4,6 +4,7 @@
 #![allow(rustdoc::broken_intra_doc_links, rustdoc::invalid_html_tags, rustdoc::bare_urls)]
 
 use crate::files::program_name;
+use crate::hint::HintArgs;
 use crate::people::PersonArgs;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueHint};
@@ -36,6 +37,9 @@ pub struct Inputs {
     /// The files it may read, and its limits
     #[command(flatten)]
     pub allowed: Allowed,
+    /// Where the object is in the photograph
+    #[command(flatten)]
+    pub hint: HintArgs,
 }
 
 /// The files that a program may read, and its limits.

@@ -98,9 +98,6 @@ pub fn program(inputs: &Inputs, quiet: bool) -> Result<Program, Failure> {
     if let Some(n) = inputs.who.person {
         program = program.set("person", &n.to_string());
     }
-    if let Some([x, y, w, h]) = inputs.who.near {
-        program = program.set("near", &format!("[{x}, {y}, {w}, {h}]"));
-    }
     for (name, value) in &inputs.sets {
         program = program.set(name, value);
     }
@@ -122,8 +119,9 @@ pub fn photo(path: &Path) -> Result<Photo, Failure> {
         .map_err(|e| plain(format!("{}: {e}", path.display())))
 }
 
-/// Binds the files of `--observe`, `--keypoints` and `--observe-contours`. Returns the
-/// name and the value of the photograph, if one is among them.
+/// Binds the files of `--observe`, `--keypoints` and `--observe-contours`, and points out
+/// what the command line does in the photograph. Returns the name and the value of the
+/// photograph, if one is among them.
 pub fn observe(
     mut program: Program,
     job: &Job,
@@ -174,6 +172,15 @@ pub fn observe(
         let contours = Value::object(ImageValue::contours(map, photo));
         program = program.observe(&name, contours.clone());
         image = image.map(|(name, _)| (name, contours));
+    }
+    if let Some(option) = job.inputs.hint.option() {
+        let Some((name, _)) = image else {
+            return Err(plain(format!("{option} needs a photograph: --observe FILE")));
+        };
+        let hinted = program.hint(job.inputs.hint.read()?);
+        program = hinted.map_err(|f| Failure::Plain(f.message, f.hint))?;
+        let value = program.observed().find(|(n, _)| *n == name).map(|(_, v)| v.clone());
+        image = value.map(|v| (name, v));
     }
     Ok((program, image))
 }

@@ -103,6 +103,9 @@ pub fn inputs_hash(job: &Job, model: &Model) -> Result<String, Failure> {
     if job.inputs.edges.is_some() {
         all.push_str(&bytes_hash(&inputs::detector_bytes(job.inputs.edges.as_deref())?));
     }
+    if job.inputs.hint.option().is_some() {
+        all.push_str(&bytes_hash(&job.inputs.hint.bytes()?));
+    }
     Ok(text_hash(&all))
 }
 

@@ -11,6 +11,7 @@ pub mod best;
 pub mod drawing_budget;
 pub mod embedded;
 pub mod files;
+pub mod hint;
 pub mod inputs;
 pub mod job;
 pub mod keypoints;

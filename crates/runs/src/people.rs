@@ -14,27 +14,10 @@ pub struct PersonArgs {
     /// `person`
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub person: Option<u32>,
-    /// A box in pixels of the photograph: selects the person who fills it best. Sets the
-    /// program's `near`
-    #[arg(long = "box", value_name = "X,Y,W,H", value_parser = rectangle)]
-    pub near: Option<[f64; 4]>,
     /// A folder with networks to detect people with, instead of the built-in ones:
     /// pose_detection.tflite, pose_landmark_heavy.tflite, …_full or …_lite
     #[arg(long, value_name = "DIR")]
     pub models: Option<PathBuf>,
-}
-
-/// Parses `X,Y,W,H`.
-fn rectangle(text: &str) -> Result<[f64; 4], String> {
-    let numbers: Vec<f64> = text
-        .split(',')
-        .filter_map(|x| x.trim().parse().ok())
-        .filter(|x: &f64| x.is_finite())
-        .collect();
-    match numbers[..] {
-        [x, y, w, h] if text.split(',').count() == 4 && w > 0.0 && h > 0.0 => Ok([x, y, w, h]),
-        _ => Err("expected four numbers X,Y,W,H with positive width and height".into()),
-    }
 }
 
 /// The joints of a body; landmarks of faces and hands are left out, since they would
@@ -72,10 +55,10 @@ pub fn warnings(name: &str, image: &Value, person: u32) -> Vec<String> {
             100.0 * chosen.sure
         ));
     }
-    if people.len() > 1 {
+    if people.len() > 1 && image.hint().is_empty() {
         all.push(format!(
             "several people were found in `{name}`; person {person} is used. Choose another with \
-             --person N or --box X,Y,W,H (`pcadlang detect` lists them)"
+             --person N, --at X,Y or --box X,Y,W,H (`pcadlang detect` lists them)"
         ));
     }
     let inside = inside(chosen, image.size());

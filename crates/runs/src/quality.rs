@@ -140,6 +140,7 @@ mod tests {
             edges: None,
             who: Default::default(),
             allowed: Default::default(),
+            hint: Default::default(),
         };
         Job::of(
             inputs,

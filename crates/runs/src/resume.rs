@@ -9,7 +9,7 @@ use std::path::Path;
 const KEYS: [(&str, &str); 7] = [
     ("version", "version"),
     ("program_hash", "program"),
-    ("inputs_hash", "picture, camera or keypoints"),
+    ("inputs_hash", "picture, hint, camera or keypoints"),
     ("seed", "seed"),
     ("set", "--set"),
     ("edges", "--edges"),

@@ -68,6 +68,13 @@ impl App {
                 self.permit(&o.observe)?;
                 self.change(o.session, move |open| open.observe(o.observe, Stop::default()))?
             }
+            Call::Hint(h) => {
+                if let Some(mask) = &h.hint.mask {
+                    self.folder.file(&mask.to_string_lossy())?;
+                }
+                let hint = h.hint.arguments();
+                self.change(h.session, move |open| open.hint(hint, Stop::default()))?
+            }
             Call::Enter(e) => self.enter(e.session, e.text)?,
             Call::Interrupt(i) => {
                 self.sessions.get(i.session)?.interrupt();

@@ -11,6 +11,7 @@ mod app;
 mod args;
 mod folder;
 mod guard;
+mod hint;
 mod language;
 mod listener;
 mod protocol;

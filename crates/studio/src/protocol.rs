@@ -1,6 +1,7 @@
 //! The frames that the page and the studio exchange (`docs/reference/studio.md`): requests
 //! are parsed, answers are written. Nothing here does what is asked.
 
+use super::hint::HintJson;
 use pcadlang_syntax::diag::nearest;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -130,6 +131,8 @@ methods! {
     Replace = "replace" { session: u64, text: String }
     /// Opens a session again with other data.
     Observe = "observe" { session: u64, observe: Vec<String> }
+    /// Says where the object is in a session's photograph.
+    Hint = "hint" { session: u64, hint: HintJson }
     /// An entry of the prompt.
     Enter = "enter" { session: u64, text: String }
     /// Stops what a session is doing.

@@ -2,6 +2,7 @@
 //! is done in turn.
 
 use super::folder::is_picture;
+use super::hint::HintJson;
 use super::results::finite;
 use pcadlang_engine::lang::reach::path_within;
 use pcadlang_engine::trace::Stop;
@@ -9,6 +10,7 @@ use pcadlang_library::Program;
 use pcadlang_library::scene::ImageValue;
 use pcadlang_runs::args::{Inputs, Job, Sampling};
 use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::hint::HintArgs;
 use pcadlang_runs::reopening::reopened::Reopened;
 use pcadlang_runs::{inputs, quality};
 use pcadlang_workbench::session::{Session, observed_image};
@@ -64,6 +66,7 @@ pub fn job_of(program: &str, sets: &BTreeMap<String, String>, observe: &[String]
         edges: None,
         who: Default::default(),
         allowed: Default::default(),
+        hint: Default::default(),
     };
     let sampling = Sampling { seed: 1, ..Sampling::default() };
     Job { observe: observe.to_vec(), ..Job::of(inputs, sampling) }
@@ -178,15 +181,30 @@ impl OpenSession {
         Ok(OpenSession { session, job, note: said.text, missing })
     }
 
-    /// Gives the program other data. `:undo` goes back to the program with the old data.
+    /// Gives the program other data, without a hint, which was about the old photograph.
+    /// `:undo` goes back to the program with the old data.
     pub fn observe(&mut self, observe: Vec<String>, stop: Stop) -> Result<(), Failure> {
-        let job = Job { observe, ..self.job.clone() };
+        let mut job = Job { observe, ..self.job.clone() };
+        job.inputs.hint = HintArgs::default();
         let program = inputs::program(&job.inputs, true)?;
         let program = match program.text() == self.session.text() {
             true => program,
             false => program.edited(self.session.text())?,
         };
         self.take_over(OpenSession::of(program, job, stop)?, "other data");
+        Ok(())
+    }
+
+    /// Says where the object is in the photograph, in which nothing is detected anew.
+    /// `:undo` goes back.
+    pub fn hint(&mut self, hint: HintArgs, stop: Stop) -> Result<(), Failure> {
+        let program = self.session.program().clone();
+        let hinted = program.hint(hint.read()?);
+        let program = hinted.map_err(|f| Failure::Plain(f.message, f.hint))?;
+        let (session, said) = Session::open(program, self.job.sampling.seed, stop)?;
+        self.session.take_over(session, "another hint");
+        self.job.inputs.hint = hint;
+        self.note = said.text;
         Ok(())
     }
 
@@ -243,6 +261,7 @@ impl OpenSession {
             "text": s.text(),
             "note": self.note,
             "observe": self.job.observe,
+            "hint": HintJson::of(&self.job.inputs.hint).ok(),
             "photo": photo.map(|(w, h)| json!({ "name": name, "width": w, "height": h })),
             "data": data,
             "params": params,

@@ -168,6 +168,51 @@ fn a_photograph_is_sent_and_observed() {
 }
 
 #[test]
+fn a_hint_reaches_the_program_and_its_runs() {
+    let s = Studio::new(&[]);
+    let program = "include \"std/scene.pcad\" as scene; data photo: image;
+        let h = scene.hint(photo); let n = len(h.outline) + len(h.at) + len(h.not);
+        let top = if len(h.axis) > 0 { h.axis.top } else { [] };
+        assume x ~ normal(0, 1); observe normal(x, 1) = 0;
+        infer { repeat 4 { mh(@x); collect h.box, top, n; } }";
+    std::fs::write(s.folder.join("p.pcad"), program).unwrap();
+    std::fs::copy("examples/images/table_lamp.png", s.folder.join("lamp.png")).unwrap();
+    std::fs::copy("examples/images/table_lamp.png", s.folder.join("mask.png")).unwrap();
+    let mut page = s.page();
+    let opened = page.ask("open", json!({ "program": "p.pcad", "observe": ["lamp.png"] }));
+    let id = &opened["session"];
+    assert_eq!(opened["hint"]["box"], json!(null));
+    let hint = json!({
+        "mask": "mask.png", "outline": [[1.0, 1.0], [40.0, 1.0], [40.0, 40.0]],
+        "box": [1.0, 2.0, 30.0, 40.5],
+        "axis": { "foot": [20.0, 60.0], "top": [21.0, 3.0], "width": 9.0 },
+        "at": [[20.0, 20.0]], "not": [[3.0, 3.0], [4.0, 4.0]],
+    });
+    let said = page.ask("hint", json!({ "session": id, "hint": hint }));
+    assert_eq!((&said["hint"], &said["undo"]), (&hint, &json!("another hint")));
+    let entered = page.ask("enter", json!({ "session": id, "text": "concat(h.box, top, [n])" }));
+    assert!(text(&entered["text"]).contains("[1, 2, 30, 40.5, 21, 3, 6]"), "{entered}");
+    let begun = json!({ "session": id, "settings": { "chains": 1 } });
+    let run = page.ask("run", begun)["run"].clone();
+    let run = run.as_str().unwrap();
+    assert_eq!(page.wait(run, &["done", "failed"])["state"], "done");
+    let record = std::fs::read_to_string(s.folder.join(run).join("run.json")).unwrap();
+    assert!(record.contains("\"1,2,30,40.5\"") && record.contains("mask.png"), "{record}");
+    assert_eq!(page.ask("open", json!({ "run": run }))["hint"], hint);
+
+    let wrong = |hint: Value| json!({ "session": id, "hint": hint });
+    let says = page.refused("hint", wrong(json!({ "box": [9999, 0, 5, 5] })));
+    assert!(says.contains("outside the photograph"), "{says}");
+    page.refused("hint", wrong(json!({ "bax": [1, 0, 5, 5] })));
+    page.refused("hint", wrong(json!({ "mask": "../mask.png" })));
+    // Other data, and an empty hint, are without it.
+    assert_eq!(page.ask("hint", wrong(json!({})))["hint"], opened["hint"]);
+    page.ask("hint", wrong(hint));
+    let other = page.ask("observe", json!({ "session": id, "observe": ["lamp.png"] }));
+    assert_eq!(other["hint"], opened["hint"]);
+}
+
+#[test]
 fn an_endless_command_is_interrupted_and_the_session_goes_on() {
     let s = Studio::new(&["coin.pcad"]);
     let mut page = s.page();

@@ -111,7 +111,8 @@ impl<'a> Evaluation<'a> {
         let items = Items::of(&program, detections.is_some())?;
         program.without_data().compile()?;
         let dir = open(&a.out).map_err(|e| plain(e.to_string()))?;
-        let edges = inputs::detector_bytes(a.inputs.edges.as_deref())?;
+        let same = [inputs::detector_bytes(a.inputs.edges.as_deref())?, a.inputs.hint.bytes()?];
+        let same = same.concat();
         let mut said = None;
         let task = |case: Case| {
             let camera = case.camera.clone().or_else(|| a.inputs.camera.clone());
@@ -124,7 +125,7 @@ impl<'a> Evaluation<'a> {
             let mut job = Job { observe, ..Job::of(inputs, a.sampling.clone()) };
             said = quality::apply(&mut job, detections.is_some())?;
             let inputs =
-                bytes_hash(&[observed::bytes(&case, detections.as_ref()), edges.clone()].concat());
+                bytes_hash(&[observed::bytes(&case, detections.as_ref()), same.clone()].concat());
             let record = job::record(&job, &hash, &inputs);
             let chosen = a.only.is_empty() || a.only.contains(&case.name);
             Ok(Task { case, job, record, chosen, row: None })

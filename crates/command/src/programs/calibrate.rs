@@ -64,6 +64,7 @@ fn job(a: &Check, path: &str) -> Job {
             edges: None,
             who: PersonArgs::default(),
             allowed: a.allowed.clone(),
+            hint: Default::default(),
         },
         observe: a.observe.clone(),
         observe_contours: None,

@@ -73,6 +73,7 @@ fn job(a: &Repl, path: &str) -> Job {
             edges: None,
             who: Default::default(),
             allowed: a.allowed.clone(),
+            hint: Default::default(),
         },
         observe: a.observe.clone(),
         observe_contours: None,

@@ -101,6 +101,7 @@ pub fn tradeoff(a: &Tradeoff) -> Result<(), Failure> {
 impl<'a> Measurement<'a> {
     /// Prepares a measurement, and reports all errors in its input before the first run.
     fn prepare(a: &'a Tradeoff) -> Result<Measurement<'a>, Failure> {
+        a.inputs.hint.none_for("tradeoff")?;
         let program = inputs::program(&a.inputs, a.quiet)?;
         let Settings { all: settings, candidates } = settings::read(a)?;
         let hashes = settings::programs(a, &settings)?;

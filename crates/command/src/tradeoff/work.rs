@@ -94,6 +94,7 @@ fn job(a: &Tradeoff, Task { setting, case, seed }: Task, threads: u32) -> Job {
         edges: a.inputs.edges.clone(),
         who: a.inputs.who.clone(),
         allowed: a.inputs.allowed.clone(),
+        hint: Default::default(),
     };
     let sampling = Sampling {
         seed,

@@ -190,6 +190,12 @@ impl Program {
         self
     }
 
+    /// Returns the names and values of the `data` items that were set, in the order of setting.
+    #[doc(hidden)]
+    pub fn observed(&self) -> impl Iterator<Item = (&str, &Value)> {
+        self.data.iter().map(|(name, v)| (&**name, v))
+    }
+
     /// Allows its `data` items and kernels to read files below a folder. For included
     /// files, see [`Program::open_allowing`]: they were read when the program was opened.
     ///

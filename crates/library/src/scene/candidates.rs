@@ -55,7 +55,7 @@ pub(super) const TABLE: &[Row] = &[native(
         };
         let camera = camera(a, (width, height))?;
         let options = CandidateOptions { most: a.int("most")? as usize, size };
-        let found = image.prepared.get(options, |o| match image.as_photo() {
+        let found = image.prepared().get(options, |o| match image.as_photo() {
             Some(photo) => Ok(candidates(photo, o)),
             None => Ok(enclosed(image.map()?, o)),
         });

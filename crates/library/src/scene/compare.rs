@@ -276,7 +276,7 @@ impl ContourOf {
     fn prepared(&self, observed: &Value) -> Result<Arc<ContourRatio>, Fault> {
         let image = image(observed, &self.view, self.name())?;
         let Camera { width, height, .. } = self.view.camera().scaled_to(self.size);
-        image.prepared.get((self.options.clone(), width, height), |(options, w, h)| {
+        image.prepared().get((self.options.clone(), width, height), |(options, w, h)| {
             ContourRatio::prepare(image.map()?, *w, *h, options).map_err(unsuitable(self.name()))
         })
     }
@@ -327,7 +327,7 @@ impl ChamferOf {
     fn prepared(&self, observed: &Value) -> Result<Arc<Chamfer>, Fault> {
         let image = image(observed, &self.view, self.name())?;
         let Camera { width, height, .. } = self.view.camera().scaled_to(self.size);
-        image.prepared.get((self.options.clone(), width, height), |(options, w, h)| {
+        image.prepared().get((self.options.clone(), width, height), |(options, w, h)| {
             Chamfer::prepare(image.map()?, *w, *h, options).map_err(unsuitable(self.name()))
         })
     }

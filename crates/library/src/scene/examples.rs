@@ -109,6 +109,13 @@ factor(-100 * max(reach[2] - 1, 0));  // it is probably all in the picture",
         ),
     ),
     (
+        "scene.hint",
+        "\
+data photo = image(\"ball.png\");
+let hint = scene.hint(photo);
+let middle = if len(hint.box) > 0 { hint.box[0] + hint.box[2] / 2 } else { photo.width / 2 };",
+    ),
+    (
         "scene.people",
         "\
 data photo = image(\"ball.png\");

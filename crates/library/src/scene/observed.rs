@@ -3,14 +3,14 @@
 //! Data that comparators derive from an observation alone are computed on first use and
 //! cached with it.
 
-use super::{IMAGE, native};
+use super::{IMAGE, native, people};
 use pcadlang_detectors::people::Person;
 use pcadlang_engine::lang::builtins::{Domain, Row, Type, arg, int, num, opt};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::{Object, Value};
 use pcadlang_scene::vision::{
-    ContourDetector, ContourMap, DepthMap, GradientDetector, Keypoints, MAP_SIZE, MOST_MAP_SIZE,
-    Mask, Photo, SoftMap,
+    ContourDetector, ContourMap, DepthMap, GradientDetector, Hint, Keypoints, MAP_SIZE,
+    MOST_MAP_SIZE, Mask, Photo, SoftMap,
 };
 use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -69,9 +69,17 @@ impl Prepared {
 /// The options of a search for people: the number of views, and the maximum number of people.
 pub(super) type PeopleKey = (u32, u32);
 
-/// A photograph, a ready-made contour map, or both.
+/// A photograph, a ready-made contour map, or both, and what a user pointed out in it.
+/// Images of one picture with different hints share what was found in it.
 #[derive(Debug, Default)]
 pub struct ImageValue {
+    picture: Arc<Picture>,
+    hint: Hint,
+}
+
+/// A picture, and what was found in it.
+#[derive(Debug, Default)]
+struct Picture {
     photo: Option<Photo>,
     /// Its contours, given or detected on first use.
     map: OnceLock<Result<ContourMap, Fault>>,
@@ -80,8 +88,8 @@ pub struct ImageValue {
     /// The detector to use where the program does not choose one.
     by: OnceLock<DetectorValue>,
     /// Contours by other detectors, candidate objects, people, and the reference data of
-    /// comparators.
-    pub(super) prepared: Prepared,
+    /// comparators. What depends on the hint, too, has it in its key.
+    prepared: Prepared,
 }
 
 impl ImageValue {
@@ -93,24 +101,45 @@ impl ImageValue {
 
     /// Creates an image of a photograph; its contours are detected when they are needed.
     pub fn photo(photo: Photo) -> Self {
-        ImageValue { photo: Some(photo), ..ImageValue::default() }
+        ImageValue::of(Picture { photo: Some(photo), ..Picture::default() })
     }
 
     /// Creates an image of a ready-made contour map, and its photograph if available.
     pub fn contours(map: ContourMap, photo: Option<Photo>) -> Self {
-        ImageValue { photo, map: OnceLock::from(Ok(map)), ready: true, ..ImageValue::default() }
+        ImageValue::of(Picture::contours(map, photo))
+    }
+
+    fn of(picture: Picture) -> Self {
+        ImageValue { picture: Arc::new(picture), hint: Hint::default() }
+    }
+
+    /// Returns the image with another hint, which must suit its size ([`Hint::check`]).
+    #[must_use]
+    pub fn with_hint(&self, hint: Hint) -> Self {
+        ImageValue { picture: Arc::clone(&self.picture), hint }
+    }
+
+    /// Returns what was pointed out in it.
+    pub fn hint(&self) -> &Hint {
+        &self.hint
     }
 
     /// Returns the photograph.
     pub fn as_photo(&self) -> Option<&Photo> {
-        self.photo.as_ref()
+        self.picture.photo.as_ref()
     }
 
-    /// Returns the people that programs detected in it, most prominent first; `None` if
-    /// no program did.
+    /// Returns what was prepared from the picture.
+    pub(super) fn prepared(&self) -> &Prepared {
+        &self.picture.prepared
+    }
+
+    /// Returns the people that programs detected in it, in the order of its hint, the most
+    /// prominent first; `None` if no program did.
     pub fn people(&self) -> Option<Vec<Person>> {
-        let all = self.prepared.first::<PeopleKey, Vec<(Person, Value)>>()?;
-        Some(all.iter().map(|(p, _)| p.clone()).collect())
+        let all = self.prepared().first::<PeopleKey, Vec<(Person, Value)>>()?;
+        let order = people::order(&all, &self.hint, self.size());
+        Some(order.into_iter().map(|i| all[i].0.clone()).collect())
     }
 
     /// Returns its contours, detecting them if necessary.
@@ -118,42 +147,34 @@ impl ImageValue {
     /// # Errors
     /// If the detector chosen for it fails.
     pub fn map(&self) -> Result<&ContourMap, Fault> {
-        let found = self.map.get_or_init(|| match &self.photo {
-            Some(photo) => {
-                let (by, least) = DetectorSettings::usual(self.by.get());
-                self.found(photo, &by).map(|map| strong(map, least))
-            }
-            None => Ok(ContourMap::default()),
-        });
-        found.as_ref().map_err(Fault::clone)
+        self.picture.map()
     }
 
     /// Returns the contours that programs have used; `None` if they have used none.
     pub fn seen(&self) -> Option<ContourMap> {
-        let otherwise = self.prepared.first::<(DetectorSettings, f32), Value>();
-        let image = otherwise.as_ref().and_then(|v| v.downcast::<ImageValue>()).unwrap_or(self);
-        image.map.get()?.as_ref().ok().cloned()
+        let otherwise = self.prepared().first::<Detected, Picture>();
+        let picture = otherwise.as_ref().unwrap_or(&self.picture);
+        picture.map.get()?.as_ref().ok().cloned()
     }
 
     /// Returns the image with `by` as the detector where the program does not choose one;
     /// given contours stay.
     pub fn detecting(image: &Value, by: &DetectorValue) -> Value {
-        match image.downcast::<ImageValue>() {
-            Some(ImageValue { photo: Some(photo), ready: false, map, by: known, .. }) => {
-                // Contours already detected belong to the detector chosen at that time.
-                if map.get().is_none() {
-                    let _ = known.set(by.clone());
-                }
-                if known.get() == Some(by) {
-                    return image.clone();
-                }
-                Value::object(ImageValue {
-                    by: OnceLock::from(by.clone()),
-                    ..ImageValue::photo(photo.clone())
-                })
-            }
-            _ => image.clone(),
+        let own = image.downcast::<ImageValue>();
+        let Some((own, photo)) = own.and_then(|i| Some((i, i.as_photo()?))) else {
+            return image.clone();
+        };
+        let Picture { ready, map, by: known, .. } = &*own.picture;
+        // Contours already detected belong to the detector chosen at that time.
+        if map.get().is_none() {
+            let _ = known.set(by.clone());
         }
+        if *ready || known.get() == Some(by) {
+            return image.clone();
+        }
+        let (photo, by) = (Some(photo.clone()), OnceLock::from(by.clone()));
+        let other = ImageValue::of(Picture { photo, by, ..Picture::default() });
+        Value::object(other.with_hint(own.hint.clone()))
     }
 
     /// Returns the same photograph with the contours of a given detector that have at
@@ -163,12 +184,43 @@ impl ImageValue {
         by: DetectorSettings,
         least: f32,
     ) -> Result<Option<Value>, Fault> {
-        let Some(photo) = &self.photo else { return Ok(None) };
-        let found = self.prepared.get((by, least), |(by, least)| {
-            let map = strong(self.found(photo, by)?, *least);
-            Ok(Value::object(ImageValue::contours(map, Some(photo.clone()))))
+        let Some(photo) = self.as_photo() else { return Ok(None) };
+        let picture = self.prepared().get((by.clone(), least), |(by, least)| {
+            let map = strong(self.picture.found(photo, by)?, *least);
+            Ok(Picture::contours(map, Some(photo.clone())))
+        })?;
+        let found = self.prepared().get((by, least, self.hint.clone()), |(.., hint)| {
+            Ok(Value::object(ImageValue { picture, hint: hint.clone() }))
         })?;
         Ok(Some(Value::clone(&found)))
+    }
+
+    /// Returns the width and height in pixels.
+    pub fn size(&self) -> (u32, u32) {
+        match self.as_photo() {
+            Some(p) => (p.width(), p.height()),
+            None => self.map().map_or((0, 0), |m| (m.width, m.height)),
+        }
+    }
+}
+
+/// A detector with its settings, and the minimum strength of its contours.
+type Detected = (DetectorSettings, f32);
+
+impl Picture {
+    fn contours(map: ContourMap, photo: Option<Photo>) -> Self {
+        Picture { photo, map: OnceLock::from(Ok(map)), ready: true, ..Picture::default() }
+    }
+
+    fn map(&self) -> Result<&ContourMap, Fault> {
+        let found = self.map.get_or_init(|| match &self.photo {
+            Some(photo) => {
+                let (by, least) = DetectorSettings::usual(self.by.get());
+                self.found(photo, &by).map(|map| strong(map, least))
+            }
+            None => Ok(ContourMap::default()),
+        });
+        found.as_ref().map_err(Fault::clone)
     }
 
     fn found(&self, photo: &Photo, by: &DetectorSettings) -> Result<ContourMap, Fault> {
@@ -183,14 +235,6 @@ impl ImageValue {
                 })?;
                 Ok(soft.contours_of(photo, *sigma))
             }
-        }
-    }
-
-    /// Returns the width and height in pixels.
-    pub fn size(&self) -> (u32, u32) {
-        match &self.photo {
-            Some(p) => (p.width(), p.height()),
-            None => self.map().map_or((0, 0), |m| (m.width, m.height)),
         }
     }
 }
@@ -470,6 +514,28 @@ mod tests {
         let numbers: Vec<Value> = more.iter().map(|x| Value::Num(*x)).collect();
         let values: Vec<&Value> = std::iter::once(image).chain(&numbers).collect();
         builtin.apply(&values)
+    }
+
+    #[test]
+    fn a_hint_does_not_find_them_again() {
+        let photo = ImageValue::photo(Photo::from_rgb(image::RgbImage::new(64, 48)).unwrap());
+        let hinted =
+            Value::object(photo.with_hint(Hint { at: vec![[3.0, 4.0]], ..Hint::default() }));
+        let own = hinted.downcast::<ImageValue>().unwrap();
+        assert!(std::ptr::eq(photo.map().unwrap(), own.map().unwrap()));
+        let (before, found) =
+            (photo.detected_by(settings(), 0.4), own.detected_by(settings(), 0.4));
+        let (before, found) = (before.unwrap().unwrap(), found.unwrap().unwrap());
+        let (before, found): (&ImageValue, &ImageValue) =
+            (before.downcast().unwrap(), found.downcast().unwrap());
+        assert!(std::ptr::eq(before.map().unwrap(), found.map().unwrap()));
+        assert!(before.hint().is_empty() && found.hint() == own.hint());
+        let other = ImageValue::detecting(&hinted, &DetectorValue::default());
+        assert_eq!(other.downcast::<ImageValue>().unwrap().hint(), own.hint());
+    }
+
+    fn settings() -> DetectorSettings {
+        DetectorSettings::usual(None).0
     }
 
     #[test]

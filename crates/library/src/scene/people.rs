@@ -1,13 +1,14 @@
 //! The people in a photograph, as values: a thin layer over [`pcadlang_detectors::people`].
 
+use super::hint::{self, HINT};
 use super::observed::{KeypointsValue, MaskValue, PeopleKey};
 use super::{IMAGE, ImageValue, native};
 use pcadlang_detectors::people::{FindOptions, Person, networks};
-use pcadlang_engine::lang::builtins::{Default, Row, Type, arg, int};
+use pcadlang_engine::lang::builtins::{Row, Type, arg, int};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::vision::keypoints::{Alternative, Keypoint, Keypoints, MEDIAPIPE};
-use pcadlang_scene::vision::{Mask, Photo};
+use pcadlang_scene::vision::{Hint, Mask, Photo};
 use std::sync::Arc;
 
 /// The maximum length of the longer side of a person's mask, in pixels.
@@ -28,16 +29,12 @@ pub(super) const TABLE: &[Row] = &[native(
             "The number of views: with increasing padding, each also mirrored.",
         ),
         int("most", 2, [1, 100], "The maximum number of people per view."),
-        arg(
-            "near",
-            Type::Array,
-            "A box [x, y, width, height]: people who fill it best come first.",
-        )
-        .or(Default::Nums(&[]))
-        .unit("pixels"),
+        HINT,
     ],
     Type::Array,
-    "The people in a photograph, the most prominent first. Each is a record: `keypoints`, 33 \
+    "The people in a photograph, the most prominent first, but first those on whom most positions \
+     `at` of the hint are and who fill its box (or else its mask or outline) best, and last those \
+     on whom its positions `not` are. Each is a record: `keypoints`, 33 \
      joints, with alternative positions where views disagree; `landmarks`, by name `at`, `spread` \
      over agreeing views and `visibility`; `metres`, by name [right, down, away] from the \
      mid-hip; `mask`; `box`, [x, y, width, height] around all joints, and `torso`, in pixels; \
@@ -47,12 +44,9 @@ pub(super) const TABLE: &[Row] = &[native(
     |a| {
         let image = a.object::<ImageValue>(0, "an image")?;
         let Some(photo) = image.as_photo() else { return Ok(Value::List(Arc::from([]))) };
-        let (views, most, near) = (a.int("views")?, a.int("most")?, a.array("near")?);
-        if !near.is_empty() && near.len() != 4 {
-            return Err(a.wrong_length("near", "4 numbers"));
-        }
+        let (views, most, hint) = (a.int("views")?, a.int("most")?, hint::asked(a, image)?);
         let key: PeopleKey = (views, most);
-        let found = image.prepared.get(key, |_| {
+        let found = image.prepared().get(key, |_| {
             let options = FindOptions { views, most: most as usize, ..FindOptions::default() };
             let fault = |why: String| Fault::new(FaultKind::Other, format!("scene.people: {why}"));
             let finder = networks::finder().map_err(|why| fault(why.into()))?;
@@ -60,15 +54,56 @@ pub(super) const TABLE: &[Row] = &[native(
             found.into_iter().map(|p| Ok((p.clone(), value(&p, photo).map_err(fault)?))).collect()
         });
         let found: Arc<Vec<(Person, Value)>> = found?;
-        let mut order: Vec<usize> = (0..found.len()).collect();
-        if let [x, y, w, h] = near[..] {
-            let wanted = [x, y, x + w, y + h];
-            let overlap: Vec<f64> = found.iter().map(|(p, _)| shared(p.bounds, wanted)).collect();
-            order.sort_by(|i, j| overlap[*j].total_cmp(&overlap[*i]));
-        }
+        let order = order(&found, &hint, (photo.width(), photo.height()));
         Ok(Value::List(order.into_iter().map(|i| found[i].1.clone()).collect()))
     },
 )];
+
+/// Returns the order of people by a hint; without one, as they are.
+pub(super) fn order(
+    found: &[(Person, Value)],
+    hint: &Hint,
+    (width, height): (u32, u32),
+) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..found.len()).collect();
+    let wanted = hint.around(width, height).map(|[x, y, w, h]| [x, y, x + w, y + h]);
+    let overlap = |(p, _): &(Person, Value)| wanted.map_or(0.0, |w| shared(p.bounds, w));
+    let overlap: Vec<f64> = found.iter().map(overlap).collect();
+    let count = |positions: &[[f64; 2]]| {
+        let mut counts = vec![0_u32; found.len()];
+        for p in positions {
+            let at = [p[0] / f64::from(width), p[1] / f64::from(height)];
+            let on: Vec<usize> = (0..found.len()).filter(|i| on_mask(&found[*i].1, at)).collect();
+            let within = || (0..found.len()).filter(|i| within(found[*i].0.bounds, *p)).collect();
+            let on = if on.is_empty() { within() } else { on };
+            on.into_iter().for_each(|i| counts[i] += 1);
+        }
+        counts
+    };
+    let (on, beside) = (count(&hint.at), count(&hint.not));
+    order.sort_by(|i, j| {
+        let positions = beside[*i].cmp(&beside[*j]).then(on[*j].cmp(&on[*i]));
+        positions.then(overlap[*j].total_cmp(&overlap[*i]))
+    });
+    order
+}
+
+/// Returns whether a position, a fraction of the picture's width and height, is on a
+/// person's mask.
+fn on_mask(person: &Value, at: [f64; 2]) -> bool {
+    let Value::Record(fields) = person else { return false };
+    let Some(MaskValue { mask, .. }) = fields.get("mask").and_then(|m| m.downcast()) else {
+        return false;
+    };
+    let pixel = |x: f64, n: u32| ((x * f64::from(n)) as u32).min(n - 1) as usize;
+    let (i, j) = (pixel(at[0], mask.width()), pixel(at[1], mask.height()));
+    mask.data()[j * mask.width() as usize + i]
+}
+
+/// Returns whether a position is within a box of left, top, right and bottom.
+fn within([left, top, right, bottom]: [f64; 4], [x, y]: [f64; 2]) -> bool {
+    (left..=right).contains(&x) && (top..=bottom).contains(&y)
+}
 
 /// The intersection of two boxes as a fraction of their union.
 fn shared(a: [f64; 4], b: [f64; 4]) -> f64 {

@@ -104,7 +104,7 @@ impl RegionOf {
         };
         let camera = self.view.camera().scaled_to(self.size);
         let key = (self.options.clone(), camera.width, camera.height);
-        image.prepared.get(key, |(options, w, h)| {
+        image.prepared().get(key, |(options, w, h)| {
             Region::prepare(photo, *w, *h, options).map_err(unsuitable(self.name()))
         })
     }
@@ -161,7 +161,7 @@ impl Likelihood for RegionOf {
             let photo = image(observed, &self.view, self.name())?.as_photo().cloned();
             let value = photo.map_or_else(ImageValue::default, ImageValue::photo);
             let key = (self.options.clone(), frame.width, frame.height);
-            value.prepared.get(key, |_| Ok(other))?;
+            value.prepared().get(key, |_| Ok(other))?;
             Ok(Value::object(value))
         };
         Some(self.region(observed).and_then(draw))

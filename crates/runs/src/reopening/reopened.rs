@@ -48,7 +48,6 @@ pub fn arguments(job: &Job) -> Vec<String> {
     g.camera.iter().for_each(|p| add("camera", path(p)));
     g.edges.iter().for_each(|e| add("edges", e.clone()));
     g.who.person.iter().for_each(|n| add("person", n.to_string()));
-    g.who.near.iter().for_each(|b| add("box", b.map(|x| x.to_string()).join(",")));
     g.who.models.iter().for_each(|p| add("models", path(p)));
     g.allowed.allow_read.iter().for_each(|p| add("allow-read", path(p)));
     g.allowed.limits.iter().for_each(|(k, n)| add("limit", format!("{k}={n}")));
@@ -62,6 +61,7 @@ pub fn arguments(job: &Job) -> Vec<String> {
     s.warmup.iter().for_each(|n| add("warmup", n.to_string()));
     s.time.iter().for_each(|t| add("time", format!("{}ms", t.as_millis())));
     add("quality", "own".into());
+    all.extend(g.hint.arguments());
     all
 }
 

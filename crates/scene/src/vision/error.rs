@@ -41,6 +41,9 @@ pub enum VisionError {
     /// An unusable contour detector file, or a detector that failed on a picture.
     #[error("{0}")]
     Detector(String),
+    /// Something pointed out in a photograph that cannot be there.
+    #[error("{0}")]
+    Hint(String),
     /// Two pictures that must have the same size do not.
     #[error("sizes differ: expected {expected_width} x {expected_height} pixels, got {got}")]
     Size {

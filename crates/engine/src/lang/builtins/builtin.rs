@@ -13,8 +13,10 @@ use std::fmt;
 use std::sync::Arc;
 
 /// Arguments that built-ins had, and what takes their place.
-const FORMER: &[(&str, &str, &str)] =
-    &[("scene.render", "detail", "every mesh is drawn as it is, so leave it out")];
+const FORMER: &[(&str, &str, &str)] = &[
+    ("scene.render", "detail", "every mesh is drawn as it is, so leave it out"),
+    ("scene.people", "near", "use `hint = { box: [x, y, width, height] }`"),
+];
 
 /// A name or text, of the language or of a host.
 pub type Text = Cow<'static, str>;
