@@ -148,7 +148,7 @@ fn finite(what: &str, numbers: &[f64]) -> Result<(), VisionError> {
 }
 
 /// Returns the pixels whose centres are inside a polygon by the even-odd rule.
-fn polygon(corners: &[[f64; 2]], width: u32, height: u32) -> Option<Mask> {
+pub(super) fn polygon(corners: &[[f64; 2]], width: u32, height: u32) -> Option<Mask> {
     let mut inside = vec![false; width as usize * height as usize];
     for (j, row) in inside.chunks_mut(width.max(1) as usize).enumerate() {
         let y = j as f64 + 0.5;

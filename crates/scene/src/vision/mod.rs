@@ -20,6 +20,7 @@ pub mod keypoints;
 pub mod mask;
 pub mod pictures;
 pub mod region;
+pub mod segmentation;
 
 #[cfg(test)]
 mod testing;

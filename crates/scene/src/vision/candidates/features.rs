@@ -36,7 +36,12 @@ impl PictureFeatures {
     pub fn of(photo: &Photo, size: u32) -> PictureFeatures {
         let photo = photo.shrunk(size);
         let (width, height) = (photo.width(), photo.height());
-        let lab = linear_to_labs(&photo.linear(width, height).rgb);
+        PictureFeatures::of_linear(width, height, &photo.linear(width, height).rgb)
+    }
+
+    /// Prepares pixels in linear light.
+    pub fn of_linear(width: u32, height: u32, rgb: &[[f32; 3]]) -> PictureFeatures {
+        let lab = linear_to_labs(rgb);
         let channel = |c: usize| lab.iter().map(|p| p[c]).collect::<Vec<f32>>();
         let [l, a, b] = [0, 1, 2].map(|c| smoothed(width, height, &channel(c), SMOOTHING));
         let smooth = l.iter().zip(&a).zip(&b).map(|((l, a), b)| [*l, *a, *b]).collect();

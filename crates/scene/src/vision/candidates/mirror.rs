@@ -113,6 +113,13 @@ pub fn symmetry(area: &Area) -> f64 {
     shape.refined(best, PI / 60.0, 1.0, 1).symmetry
 }
 
+/// Returns the mirror of a region whose normal has an angle and which passes a position.
+pub fn mirror_at(area: &Area, angle: f64, [x, y]: [f64; 2]) -> Mirror {
+    let shape = Shape::of(area, usize::MAX);
+    let (x, y) = (x - shape.centre[0], y - shape.centre[1]);
+    shape.mirror(angle, x * libm::cos(angle) + y * libm::sin(angle))
+}
+
 /// Returns the best mirror, and the best one in a different direction.
 pub fn mirrors(area: &Area) -> Vec<Mirror> {
     let (rough, all) = (Shape::of(area, SAMPLE), Shape::of(area, usize::MAX));

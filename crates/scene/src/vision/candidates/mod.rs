@@ -9,18 +9,18 @@
 //! The result is a function of the picture alone, with the same bits on any machine. The
 //! use of the candidates, and anything in three dimensions, is elsewhere.
 
-mod area;
-mod clusters;
+pub(super) mod area;
+pub(super) mod clusters;
 mod components;
 mod cut;
 mod enclosed;
-mod features;
+pub(super) mod features;
 mod felzenszwalb;
 mod merge;
-mod mirror;
-mod pixels;
-mod profile;
-mod rim;
+pub(super) mod mirror;
+pub(super) mod pixels;
+pub(super) mod profile;
+pub(super) mod rim;
 mod score;
 #[cfg(test)]
 mod tests;

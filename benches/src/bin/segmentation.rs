@@ -1,0 +1,112 @@
+//! Measures how well objects are found in photographs with known masks, given boxes or axes.
+//!
+//!     cargo run --release -p pcadlang-benches --bin segmentation -- FOLDER...
+//!
+//! A folder holds `image.png` and the ground truth `mask.png`. Prints for each folder the
+//! intersection over union of the first guess by each method, of the best of all guesses and
+//! of the one with the highest score, given the exact box of the mask, and the processor
+//! seconds of all guesses; then the means, medians and numbers of at least 0.8, also for
+//! boxes with sides that are off by up to 8 % of the size, five for each.
+
+#[path = "clock/mod.rs"]
+mod clock;
+
+use clock::processor_seconds;
+use pcadlang_scene::vision::segmentation::{Guess, Method, guesses};
+use pcadlang_scene::vision::{Hint, Limits, Mask, mask, photo};
+use std::path::{Path, PathBuf};
+
+const NAMES: [&str; 6] = ["ellipse", "cut", "symmetric", "best", "score", "agreed"];
+/// How far sides of boxes are off, as a part of the size, and boxes per photograph.
+const OFF: f64 = 0.08;
+const BOXES: u64 = 5;
+
+fn overlap(a: &Mask, b: &Mask) -> f64 {
+    let pairs = || a.data().iter().zip(b.data());
+    let both = pairs().filter(|(a, b)| **a && **b).count();
+    both as f64 / pairs().filter(|(a, b)| **a || **b).count().max(1) as f64
+}
+
+/// Left, top, right and bottom of a mask.
+fn bounds(mask: &Mask) -> [f64; 4] {
+    let mut b = [f64::INFINITY, f64::INFINITY, 0.0, 0.0];
+    for p in (0..mask.data().len()).filter(|p| mask.data()[*p]) {
+        let (i, j) = ((p as u32 % mask.width()) as f64, (p as u32 / mask.width()) as f64);
+        b = [b[0].min(i), b[1].min(j), b[2].max(i + 1.0), b[3].max(j + 1.0)];
+    }
+    b
+}
+
+/// A number in -1..1 that is the same each time.
+fn noise(seed: u64) -> f64 {
+    let x = (seed + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let x = (x ^ x >> 31).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    ((x ^ x >> 29) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+/// The overlaps by name, and the score of the guess with the highest one.
+fn overlaps(all: &[Guess], truth: &Mask) -> [f64; NAMES.len()] {
+    let of = |g: &Guess| overlap(&g.mask.resized(truth.width(), truth.height()), truth);
+    let first = |m: Method| all.iter().find(|g| g.method == m).map_or(0.0, of);
+    let top = all.iter().reduce(|a, b| if b.score > a.score { b } else { a });
+    [
+        first(Method::Ellipse),
+        first(Method::Cut),
+        first(Method::Symmetric),
+        all.iter().map(of).fold(0.0, f64::max),
+        top.map_or(0.0, of),
+        top.map_or(0.0, |g| g.score),
+    ]
+}
+
+fn summary(name: &str, all: &[[f64; NAMES.len()]]) {
+    for (k, method) in NAMES.iter().enumerate() {
+        let mut values: Vec<f64> = all.iter().map(|o| o[k]).collect();
+        values.sort_by(f64::total_cmp);
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let found = values.iter().filter(|v| **v >= 0.8).count();
+        let median = values[values.len() / 2];
+        println!("{name:12} {method:10} {mean:.3} {median:.3} {found:3} of {}", values.len());
+    }
+}
+
+fn look(folder: &Path) -> Result<[Vec<[f64; NAMES.len()]>; 2], String> {
+    let read = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
+    let (limits, image, truth) = (Limits::default(), read("image.png")?, read("mask.png")?);
+    let photo = photo::decode(&image, &limits).map_err(|e| e.to_string())?;
+    let truth = mask::decode(&truth, &limits).map_err(|e| e.to_string())?;
+    let [x0, y0, x1, y1] = bounds(&truth);
+    let hint = |off: [f64; 4]| {
+        let (w, h) = (x1 - x0, y1 - y0);
+        let (left, right) = (x0 + OFF * w * off[0], x1 + OFF * w * off[1]);
+        let (top, bottom) = (y0 + OFF * h * off[2], y1 + OFF * h * off[3]);
+        Hint { bounds: Some([left, top, right - left, bottom - top]), ..Hint::default() }
+    };
+    let start = processor_seconds();
+    let exact = guesses(&photo, &hint([0.0; 4]));
+    let seconds = processor_seconds() - start;
+    let exact = overlaps(&exact, &truth);
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let [a, b, c, d, e, f] = exact;
+    println!("{name:30} {a:.3} {b:.3} {c:.3}  {d:.3} {e:.3} {f:.3}  {seconds:.3}");
+    let off = |n: u64| std::array::from_fn(|k| noise(4 * n + k as u64));
+    let loose = (0..BOXES).map(|n| overlaps(&guesses(&photo, &hint(off(n))), &truth));
+    Ok([vec![exact], loose.collect()])
+}
+
+fn main() -> Result<(), String> {
+    let folders: Vec<PathBuf> = std::env::args().skip(1).map(PathBuf::from).collect();
+    if folders.is_empty() {
+        return Err("usage: segmentation FOLDER...".into());
+    }
+    println!("{:30} ellip cut   symm   best  score agreed seconds", "");
+    let (mut exact, mut loose) = (Vec::new(), Vec::new());
+    for folder in &folders {
+        let [a, b] = look(folder)?;
+        exact.extend(a);
+        loose.extend(b);
+    }
+    summary("exact", &exact);
+    summary("off by 8 %", &loose);
+    Ok(())
+}

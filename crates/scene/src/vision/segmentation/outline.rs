@@ -1,0 +1,239 @@
+//! The best outline that is symmetric about an axis, by dynamic programming over rows across
+//! the axis: exact for what is on the strip.
+//!
+//! An outline has a half-width in each row from its first to its last. It gains what is
+//! inside, the edges along both sides in the direction of their slope, and the edges along
+//! its flat ends. It pays for changes of the slope, up to a bound: a price on the slope alone
+//! makes teeth.
+
+use pcadlang_numerics::num::simd::vectorised;
+
+/// The steepest slope, cells of half-width per row, and the number of slopes.
+pub const STEEPEST: usize = 6;
+pub const SLOPES: usize = 2 * STEEPEST + 1;
+/// The least half-width, cells.
+pub const LEAST: usize = 2;
+/// What is impossible gains this.
+const NEVER: f32 = -1e9;
+
+/// The prices of an outline's slopes, nats.
+#[derive(Clone, Copy)]
+pub struct Prices {
+    /// Per unit of slope and row.
+    pub slope: f32,
+    /// Per unit of change of the slope, and the most for a change.
+    pub change: f32,
+    pub most: f32,
+}
+
+/// Evidence in cells of rows across an axis, row by row.
+pub struct Strip {
+    pub rows: usize,
+    pub columns: usize,
+    /// Sums of what the cells of a row before each column gain inside an outline: one entry
+    /// more per row than there are columns.
+    pub inside: Vec<f32>,
+    /// The same of what they gain on a flat end.
+    pub ends: Vec<f32>,
+    /// What a right side of each slope gains per row, by slope, row and column.
+    pub right: Vec<f32>,
+    /// What a left side gains, by slope and row, with the columns from right to left.
+    pub left: Vec<f32>,
+}
+
+/// An outline: half-widths from a first row on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    /// What it gains, nats.
+    pub score: f32,
+    pub first: usize,
+    pub widths: Vec<usize>,
+}
+
+/// Memory for the scores of outlines.
+#[derive(Default)]
+pub struct Table {
+    /// The best score of outlines that reach a row with a slope and a half-width; the last of
+    /// the slopes is for those that begin there.
+    best: Vec<f32>,
+    /// What the last row allows to go on with, by slope and half-width.
+    before: Vec<f32>,
+}
+
+/// States per half-width: the slopes, and the beginning.
+const STATES: usize = SLOPES + 1;
+
+impl Strip {
+    /// Returns the best outline about the axis in a column, with half-widths of at most
+    /// `widest` cells; `None` if the strip has no room for any.
+    pub fn outline(
+        &self,
+        axis: usize,
+        widest: usize,
+        prices: &Prices,
+        table: &mut Table,
+    ) -> Option<Outline> {
+        let room = axis.checked_sub(2)?.min(self.columns.checked_sub(axis + 3)?);
+        let widest = widest.min(room);
+        if widest < LEAST || self.rows < 3 {
+            return None;
+        }
+        let stride = widest + 1;
+        table.best.clear();
+        table.best.resize(self.rows * STATES * stride, NEVER);
+        table.before.clear();
+        table.before.resize(SLOPES * stride, NEVER);
+        let (mut best, mut end) = (NEVER, (0, 0, 0));
+        for t in 1..self.rows - 1 {
+            let (done, rest) = table.best.split_at_mut(t * STATES * stride);
+            let row = &mut rest[..STATES * stride];
+            vectorised(
+                #[inline(always)]
+                || {
+                    if t > 1 {
+                        ways_on(
+                            &done[(t - 1) * STATES * stride..],
+                            stride,
+                            prices,
+                            &mut table.before,
+                        );
+                        self.continued(axis, t, stride, prices.slope, &table.before, row);
+                    }
+                    self.begun(axis, t, stride, row);
+                },
+            );
+            for (state, scores) in row.chunks_exact(stride).enumerate() {
+                for w in LEAST..stride {
+                    let score = scores[w] + self.end(axis, t + 1, w);
+                    if score > best {
+                        (best, end) = (score, (t, state, w));
+                    }
+                }
+            }
+        }
+        let (first, widths) = self.traced(end, stride, prices, &table.best);
+        Some(Outline { score: best, first, widths })
+    }
+
+    /// What a flat end just before or after an outline gains in a row.
+    #[inline(always)]
+    fn end(&self, axis: usize, row: usize, w: usize) -> f32 {
+        let ends = &self.ends[row * (self.columns + 1)..];
+        ends[axis + w + 1] - ends[axis - w]
+    }
+
+    /// Fills in the scores of outlines that begin in a row, and adds to all what is inside
+    /// it.
+    #[inline(always)]
+    fn begun(&self, axis: usize, t: usize, stride: usize, row: &mut [f32]) {
+        for w in LEAST..stride {
+            row[SLOPES * stride + w] = self.end(axis, t, w);
+        }
+        let inside = &self.inside[t * (self.columns + 1)..];
+        for scores in row.chunks_exact_mut(stride) {
+            for w in LEAST..stride {
+                scores[w] += inside[axis + w + 1] - inside[axis - w];
+            }
+        }
+    }
+
+    /// Fills in the scores of outlines that go on in a row, without what is inside it.
+    #[inline(always)]
+    fn continued(
+        &self,
+        axis: usize,
+        t: usize,
+        stride: usize,
+        price: f32,
+        before: &[f32],
+        row: &mut [f32],
+    ) {
+        for m in 0..SLOPES {
+            let slope = m as isize - STEEPEST as isize;
+            let price = price * slope.unsigned_abs() as f32;
+            // The half-widths that both rows have, and the middle between them.
+            let first = (LEAST as isize + slope.max(0)) as usize;
+            let last = (stride as isize + slope.min(0)).max(first as isize) as usize;
+            let from = (first as isize - slope) as usize;
+            let middle = (2 * first as isize - slope).div_euclid(2) as usize;
+            let at = (m * self.rows + t) * self.columns;
+            let count = last - first;
+            let right = &self.right[at + axis + middle..][..count];
+            let left = &self.left[at + self.columns - 1 - axis + middle..][..count];
+            let before = &before[m * stride + from..][..count];
+            let scores = &mut row[m * stride + first..][..count];
+            for i in 0..count {
+                scores[i] = before[i] + right[i] + left[i] - price;
+            }
+        }
+    }
+
+    /// Follows the best outline back from its last row, by state and half-width there.
+    fn traced(
+        &self,
+        (mut t, mut m, mut w): (usize, usize, usize),
+        stride: usize,
+        prices: &Prices,
+        best: &[f32],
+    ) -> (usize, Vec<usize>) {
+        let mut widths = vec![w];
+        while m < SLOPES {
+            (t, w) = (t - 1, w + STEEPEST - m);
+            widths.push(w);
+            let score = |k: usize| best[(t * STATES + k) * stride + w] - prices.of(k, m);
+            m = (0..STATES).fold(SLOPES, |b, k| if score(k) > score(b) { k } else { b });
+        }
+        widths.reverse();
+        (t, widths)
+    }
+}
+
+impl Prices {
+    /// The price of going from one slope to another; free at the beginning.
+    fn of(&self, from: usize, to: usize) -> f32 {
+        if from == SLOPES { 0.0 } else { (self.change * from.abs_diff(to) as f32).min(self.most) }
+    }
+}
+
+/// Returns for each slope and half-width the best score of the last row, less the price of
+/// the change to that slope. Prices grow in proportion to the change up to a bound, so two
+/// passes over the slopes suffice (Felzenszwalb & Huttenlocher 2012, "Distance transforms of
+/// sampled functions", Theory of Computing 8, 415-428).
+#[inline(always)]
+fn ways_on(last: &[f32], stride: usize, prices: &Prices, before: &mut [f32]) {
+    let (slopes, begun) = last.split_at(SLOPES * stride);
+    before.copy_from_slice(slopes);
+    let change = prices.change;
+    for m in 1..SLOPES {
+        let (less, more) = before.split_at_mut(m * stride);
+        let less = &less[(m - 1) * stride..];
+        for (x, y) in more[..stride].iter_mut().zip(less) {
+            *x = x.max(y - change);
+        }
+    }
+    for m in (1..SLOPES).rev() {
+        let (less, more) = before.split_at_mut(m * stride);
+        let less = &mut less[(m - 1) * stride..];
+        for (x, y) in less.iter_mut().zip(&more[..stride]) {
+            *x = x.max(y - change);
+        }
+    }
+    for start in (0..stride).step_by(16) {
+        let end = (start + 16).min(stride);
+        let mut most = [NEVER; 16];
+        let most = &mut most[..end - start];
+        for (x, b) in most.iter_mut().zip(&begun[start..end]) {
+            *x = *b;
+        }
+        for m in 0..SLOPES {
+            for (x, s) in most.iter_mut().zip(&slopes[m * stride + start..m * stride + end]) {
+                *x = x.max(s - prices.most);
+            }
+        }
+        for m in 0..SLOPES {
+            for (x, s) in before[m * stride + start..m * stride + end].iter_mut().zip(&*most) {
+                *x = x.max(*s);
+            }
+        }
+    }
+}
