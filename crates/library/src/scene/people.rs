@@ -2,6 +2,7 @@
 
 use super::observed::{KeypointsValue, MaskValue, PeopleKey};
 use super::{IMAGE, ImageValue, native};
+use pcadlang_detectors::boxes::overlap;
 use pcadlang_detectors::people::{FindOptions, Person, networks};
 use pcadlang_engine::lang::builtins::{Default, Row, Type, arg, int};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
@@ -63,19 +64,12 @@ pub(super) const TABLE: &[Row] = &[native(
         let mut order: Vec<usize> = (0..found.len()).collect();
         if let [x, y, w, h] = near[..] {
             let wanted = [x, y, x + w, y + h];
-            let overlap: Vec<f64> = found.iter().map(|(p, _)| shared(p.bounds, wanted)).collect();
-            order.sort_by(|i, j| overlap[*j].total_cmp(&overlap[*i]));
+            let filled: Vec<f64> = found.iter().map(|(p, _)| overlap(p.bounds, wanted)).collect();
+            order.sort_by(|i, j| filled[*j].total_cmp(&filled[*i]));
         }
         Ok(Value::List(order.into_iter().map(|i| found[i].1.clone()).collect()))
     },
 )];
-
-/// The intersection of two boxes as a fraction of their union.
-fn shared(a: [f64; 4], b: [f64; 4]) -> f64 {
-    let area = |[l, t, r, b]: [f64; 4]| (r - l).max(0.0) * (b - t).max(0.0);
-    let both = area([a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])]);
-    both / (area(a) + area(b) - both).max(1e-9)
-}
 
 fn number(x: f64) -> Value {
     Value::Num(x)
