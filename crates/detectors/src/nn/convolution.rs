@@ -126,48 +126,52 @@ impl Convolution {
     /// Adds the products of the weights of a panel from `start` on to all rows.
     #[inline(always)]
     fn part(&self, rows: &[f32], out: &mut [f32], start: usize, panel: usize) {
-        let mut groups = rows.chunks_exact(ROWS * self.depth);
-        let mut lines = out.chunks_exact_mut(ROWS * self.channels);
-        for (group, lines) in (&mut groups).zip(&mut lines) {
-            self.rows::<ROWS>(group, lines, start, panel);
-        }
-        let rest = groups.remainder().chunks_exact(self.depth);
-        for (row, line) in rest.zip(lines.into_remainder().chunks_exact_mut(self.channels)) {
-            self.rows::<1>(row, line, start, panel);
-        }
-    }
-
-    #[inline(always)]
-    fn rows<const R: usize>(&self, rows: &[f32], out: &mut [f32], start: usize, panel: usize) {
         let end = (start + DEEP).min(self.depth);
-        let rows: [&[f32]; R] =
-            core::array::from_fn(|r| &rows[r * self.depth + start..r * self.depth + end]);
         let weights = &self.panels[(panel * self.depth + start) * PANEL..][..(end - start) * PANEL];
+        let weights = weights.as_chunks().0;
         let (first, width) = (panel * PANEL, PANEL.min(self.channels - panel * PANEL));
-        let mut sums = [[0f32; PANEL]; R];
-        for (r, sums) in sums.iter_mut().enumerate() {
-            if start == 0 {
-                sums.copy_from_slice(&self.biases[first..first + PANEL]);
-            } else {
-                sums[..width].copy_from_slice(&out[r * self.channels + first..][..width]);
-            }
-        }
-        for (k, weights) in weights.as_chunks::<PANEL>().0.iter().enumerate() {
-            for r in 0..R {
-                let x = rows[r][k];
-                for j in 0..PANEL {
-                    sums[r][j] += x * weights[j];
+        let groups = rows.chunks(ROWS * self.depth);
+        for (rows, out) in groups.zip(out.chunks_mut(ROWS * self.channels)) {
+            // If there are fewer rows, the last one is summed more than once.
+            let last = rows.len() / self.depth - 1;
+            let row = |r: usize| &rows[r.min(last) * self.depth + start..][..end - start];
+            let mut sums = [[0f32; PANEL]; ROWS];
+            for (r, sums) in sums[..=last].iter_mut().enumerate() {
+                if start == 0 {
+                    sums.copy_from_slice(&self.biases[first..first + PANEL]);
+                } else {
+                    sums[..width].copy_from_slice(&out[r * self.channels + first..][..width]);
                 }
             }
-        }
-        for (r, sums) in sums.iter_mut().enumerate() {
-            if end == self.depth {
-                let Clip { lo, hi } = self.clip;
-                sums.iter_mut().for_each(|s| *s = s.max(self.slope * *s).max(lo).min(hi));
+            let mut sums = add_products(sums, weights, [row(0), row(1), row(2), row(3)]);
+            for (r, sums) in sums[..=last].iter_mut().enumerate() {
+                if end == self.depth {
+                    let Clip { lo, hi } = self.clip;
+                    sums.iter_mut().for_each(|s| *s = s.max(self.slope * *s).max(lo).min(hi));
+                }
+                out[r * self.channels + first..][..width].copy_from_slice(&sums[..width]);
             }
-            out[r * self.channels + first..][..width].copy_from_slice(&sums[..width]);
         }
     }
+}
+
+/// Adds the products of rows and columns to sums, which stay in registers.
+#[inline(always)]
+fn add_products(
+    mut sums: [[f32; PANEL]; ROWS],
+    weights: &[[f32; PANEL]],
+    rows: [&[f32]; ROWS],
+) -> [[f32; PANEL]; ROWS] {
+    let [a, b, c, d] = rows;
+    for ((((weights, a), b), c), d) in weights.iter().zip(a).zip(b).zip(c).zip(d) {
+        let x = [*a, *b, *c, *d];
+        for r in 0..ROWS {
+            for j in 0..PANEL {
+                sums[r][j] += x[r] * weights[j];
+            }
+        }
+    }
+    sums
 }
 
 /// A convolution that treats each channel separately.
