@@ -1,7 +1,9 @@
 //! Measures one run of a network on one core: median, best and worst time of 21 runs on a
 //! uniform grey picture.
 //!
-//!     cargo run --release -p pcadlang-benches --bin network_time -- models/*.tflite
+//!     cargo run --release -p pcadlang-benches --bin network_time -- models/*.tflite models/*.json
+//!
+//! The weights of a graph model (.json) are in a file of the same name that ends in .bin.
 
 use pcadlang_detectors::nn::Network;
 use std::time::Instant;
@@ -12,10 +14,16 @@ const RUNS: usize = 21;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let files: Vec<String> = std::env::args().skip(1).collect();
     if files.is_empty() {
-        return Err("files of networks (.tflite) are wanted".into());
+        return Err("files of networks (.tflite, or .json with .bin) are wanted".into());
     }
     for file in &files {
-        let network = Network::read(&std::fs::read(file)?)?;
+        let bytes = std::fs::read(file)?;
+        let network = match file.strip_suffix(".json") {
+            Some(name) => {
+                Network::read_graph_model(&bytes, &std::fs::read(format!("{name}.bin"))?)?
+            }
+            None => Network::read(&bytes)?,
+        };
         let input = vec![0.5; network.input_shape().iter().product()];
         let mut times = Vec::new();
         for _ in 0..RUNS {
@@ -25,7 +33,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             times.push(begun.elapsed().as_secs_f64() * 1e3);
         }
         times.sort_by(f64::total_cmp);
-        println!("{file}: {:.1} ms ({:.1} to {:.1})", times[RUNS / 2], times[0], times[RUNS - 1]);
+        let (middle, work) = (times[RUNS / 2], network.work() as f64 / 1e6);
+        println!(
+            "{file}: {middle:.1} ms ({:.1} to {:.1}), {work:.0} M products",
+            times[0],
+            times[RUNS - 1]
+        );
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ use super::schema::{TRANSPOSED, code};
 use super::shape::{Clip, Size, Window};
 
 /// The maximum side of a window, and the maximum stride.
-const LONGEST: usize = 64;
+pub(super) const LONGEST: usize = 64;
 
 /// An operator in the file: its options, inputs and output.
 pub(super) struct Entry<'a> {
@@ -74,7 +74,7 @@ impl<'a> Entry<'a> {
 
     fn clip(&self, i: usize) -> Checked<Clip> {
         match self.byte(i)? {
-            0 => Ok(Clip { lo: f32::NEG_INFINITY, hi: f32::INFINITY }),
+            0 => Ok(Clip::NONE),
             1 => Ok(Clip { lo: 0.0, hi: f32::INFINITY }),
             3 => Ok(Clip { lo: 0.0, hi: 6.0 }),
             _ => Err("unknown activation".into()),
@@ -161,7 +161,7 @@ impl File<'_> {
                 ];
                 let padded = sides.map(|(n, a, b)| n.checked_add(a).and_then(|n| n.checked_add(b)));
                 fits(padded == [Some(to.height), Some(to.width), Some(to.channels)])?;
-                one(Operator::Pad([top, left, near]))
+                one(Operator::Pad { before: [top, left, near], value: 0.0 })
             }
             code::MAX_POOL | code::AVERAGE_POOL => {
                 let (from, to) = pictures()?;

@@ -13,6 +13,14 @@ const PANEL: usize = 16;
 /// The number of rows summed together.
 const ROWS: usize = 4;
 
+/// The number of weights per column that are summed before the next panel, so that they and
+/// the rows stay in the nearest cache.
+const DEEP: usize = 256;
+
+/// The number of values in the rows that are summed before the next ones: they stay in the
+/// second cache while all panels pass.
+const VALUES: usize = 1 << 17;
+
 /// A convolution with its weights and biases.
 #[derive(Debug)]
 pub(super) struct Convolution {
@@ -24,6 +32,8 @@ pub(super) struct Convolution {
     /// with zeros.
     panels: Vec<f32>,
     biases: Vec<f32>,
+    /// Negative results are multiplied by this, from 0 to 1.
+    slope: f32,
     clip: Clip,
 }
 
@@ -41,27 +51,61 @@ impl Convolution {
         }
         let mut padded = biases.to_vec();
         padded.resize(count * PANEL, 0.0);
-        Convolution { window, channels, depth, panels, biases: padded, clip }
+        Convolution { window, channels, depth, panels, biases: padded, slope: 1.0, clip }
+    }
+
+    /// Returns the number of elements stored for so many weights and output channels.
+    pub fn stored(weights: usize, channels: usize) -> usize {
+        (weights / channels.max(1)).saturating_mul(channels.next_multiple_of(PANEL))
+    }
+
+    /// Adds to the biases, if there is one for each channel and nothing is done to the
+    /// results; returns whether it did.
+    pub fn add_biases(&mut self, more: &[f32]) -> bool {
+        let is_plain = self.is_linear() && more.len() == self.channels;
+        if is_plain {
+            self.biases.iter_mut().zip(more).for_each(|(b, m)| *b += m);
+        }
+        is_plain
+    }
+
+    /// Multiplies negative results by `slope`, if nothing else is done to the results;
+    /// returns whether it does.
+    pub fn make_leaky(&mut self, slope: f32) -> bool {
+        let is_plain = self.is_linear();
+        if is_plain {
+            self.slope = slope;
+        }
+        is_plain
+    }
+
+    fn is_linear(&self) -> bool {
+        self.slope == 1.0 && self.clip == Clip::NONE
     }
 
     pub fn run(&self, input: &[f32], from: Size, to: Size, out: &mut [f32]) {
+        let pixels = (VALUES / self.depth.max(1)).max(ROWS).next_multiple_of(ROWS);
+        let blocks = out.chunks_mut(pixels * self.channels).enumerate();
         if self.window.size == [1, 1] && self.window.stride == [1, 1] {
-            return self.product(input, out);
+            let rows = input.chunks(pixels * self.depth);
+            return blocks.zip(rows).for_each(|((_, out), rows)| self.product(rows, out));
         }
         let before = self.window.before(from, to);
         let [_, width] = self.window.size;
-        // One row of output pixels at a time.
-        let mut patches = vec![0.0; to.width * self.depth];
-        for row in 0..to.height {
+        let mut patches = vec![0.0; pixels.min(to.height * to.width) * self.depth];
+        for (i, out) in blocks {
+            let count = out.len() / self.channels;
+            let patches = &mut patches[..count * self.depth];
             patches.fill(0.0);
-            for (column, patch) in patches.chunks_exact_mut(self.depth).enumerate() {
-                self.window.each(from, before, (row, column), |ky, kx, y, x| {
+            for (j, patch) in patches.chunks_exact_mut(self.depth).enumerate() {
+                let pixel = i * pixels + j;
+                let place = (pixel / to.width, pixel % to.width);
+                self.window.each(from, before, place, |ky, kx, y, x| {
                     let at = (ky * width + kx) * from.channels;
                     patch[at..at + from.channels].copy_from_slice(from.pixel(input, y, x));
                 });
             }
-            let line = to.width * to.channels;
-            self.product(&patches, &mut out[row * line..][..line]);
+            self.product(patches, out);
         }
     }
 
@@ -70,45 +114,64 @@ impl Convolution {
         vectorised(
             #[inline(always)]
             || {
-                let many = ROWS * self.depth;
-                let mut groups = rows.chunks_exact(many);
-                let mut lines = out.chunks_exact_mut(ROWS * self.channels);
-                for (group, lines) in (&mut groups).zip(&mut lines) {
-                    self.rows::<ROWS>(group, lines);
-                }
-                let rest = groups.remainder().chunks_exact(self.depth);
-                for (row, line) in rest.zip(lines.into_remainder().chunks_exact_mut(self.channels))
-                {
-                    self.rows::<1>(row, line);
+                for start in (0..self.depth).step_by(DEEP) {
+                    for panel in 0..self.biases.len() / PANEL {
+                        self.part(rows, out, start, panel);
+                    }
                 }
             },
         );
     }
 
+    /// Adds the products of the weights of a panel from `start` on to all rows.
     #[inline(always)]
-    fn rows<const R: usize>(&self, rows: &[f32], out: &mut [f32]) {
-        let rows: [&[f32]; R] =
-            core::array::from_fn(|r| &rows[r * self.depth..(r + 1) * self.depth]);
-        let panels =
-            self.panels.chunks_exact(self.depth * PANEL).zip(self.biases.chunks_exact(PANEL));
-        for (p, (panel, biases)) in panels.enumerate() {
-            let mut sums = [[0f32; PANEL]; R];
-            sums.iter_mut().for_each(|s| s.copy_from_slice(biases));
-            for (k, weights) in panel.as_chunks::<PANEL>().0.iter().enumerate() {
-                for r in 0..R {
-                    let x = rows[r][k];
-                    for j in 0..PANEL {
-                        sums[r][j] += x * weights[j];
-                    }
+    fn part(&self, rows: &[f32], out: &mut [f32], start: usize, panel: usize) {
+        let end = (start + DEEP).min(self.depth);
+        let weights = &self.panels[(panel * self.depth + start) * PANEL..][..(end - start) * PANEL];
+        let weights = weights.as_chunks().0;
+        let (first, width) = (panel * PANEL, PANEL.min(self.channels - panel * PANEL));
+        let groups = rows.chunks(ROWS * self.depth);
+        for (rows, out) in groups.zip(out.chunks_mut(ROWS * self.channels)) {
+            // If there are fewer rows, the last one is summed more than once.
+            let last = rows.len() / self.depth - 1;
+            let row = |r: usize| &rows[r.min(last) * self.depth + start..][..end - start];
+            let mut sums = [[0f32; PANEL]; ROWS];
+            for (r, sums) in sums[..=last].iter_mut().enumerate() {
+                if start == 0 {
+                    sums.copy_from_slice(&self.biases[first..first + PANEL]);
+                } else {
+                    sums[..width].copy_from_slice(&out[r * self.channels + first..][..width]);
                 }
             }
-            let width = PANEL.min(self.channels - p * PANEL);
-            for (r, sums) in sums.iter_mut().enumerate() {
-                sums.iter_mut().for_each(|s| *s = s.max(self.clip.lo).min(self.clip.hi));
-                out[r * self.channels + p * PANEL..][..width].copy_from_slice(&sums[..width]);
+            let mut sums = add_products(sums, weights, [row(0), row(1), row(2), row(3)]);
+            for (r, sums) in sums[..=last].iter_mut().enumerate() {
+                if end == self.depth {
+                    let Clip { lo, hi } = self.clip;
+                    sums.iter_mut().for_each(|s| *s = s.max(self.slope * *s).max(lo).min(hi));
+                }
+                out[r * self.channels + first..][..width].copy_from_slice(&sums[..width]);
             }
         }
     }
+}
+
+/// Adds the products of rows and columns to sums, which stay in registers.
+#[inline(always)]
+fn add_products(
+    mut sums: [[f32; PANEL]; ROWS],
+    weights: &[[f32; PANEL]],
+    rows: [&[f32]; ROWS],
+) -> [[f32; PANEL]; ROWS] {
+    let [a, b, c, d] = rows;
+    for ((((weights, a), b), c), d) in weights.iter().zip(a).zip(b).zip(c).zip(d) {
+        let x = [*a, *b, *c, *d];
+        for r in 0..ROWS {
+            for j in 0..PANEL {
+                sums[r][j] += x[r] * weights[j];
+            }
+        }
+    }
+    sums
 }
 
 /// A convolution that treats each channel separately.

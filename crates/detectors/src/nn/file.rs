@@ -2,15 +2,13 @@
 
 use super::NetworkError;
 use super::flatbuffer::Table;
+use super::network::MOST_NUMBERS;
 use super::schema::field;
 use super::sparse;
 use half::slice::HalfFloatSliceExt;
 use std::collections::HashMap;
 
 type Result<T> = core::result::Result<T, NetworkError>;
-
-/// The maximum number of elements in one tensor, and in all constants together.
-const MOST_NUMBERS: usize = 1 << 26;
 
 /// The contents of a file, before its operators are built.
 pub(super) struct File<'a> {

@@ -7,15 +7,15 @@ use std::collections::HashMap;
 /// A network read from a file.
 #[derive(Debug)]
 pub struct Network {
-    pub(super) layers: Vec<Layer>,
+    layers: Vec<Layer>,
     /// The shape of each tensor.
-    pub(super) shapes: Vec<Vec<usize>>,
-    pub(super) constants: HashMap<usize, Vec<f32>>,
-    pub(super) input: usize,
-    pub(super) outputs: Vec<usize>,
+    shapes: Vec<Vec<usize>>,
+    constants: HashMap<usize, Vec<f32>>,
+    input: usize,
+    outputs: Vec<usize>,
     /// For each tensor, the last step that reads it; `usize::MAX` for outputs.
-    pub(super) last: Vec<usize>,
-    pub(super) work: usize,
+    last: Vec<usize>,
+    work: usize,
 }
 
 /// An operator with the tensors it reads and the one it writes.
@@ -26,8 +26,54 @@ pub(super) struct Layer {
     pub output: usize,
 }
 
+/// The maximum number of elements in one tensor, and in all constants together.
+pub(super) const MOST_NUMBERS: usize = 1 << 26;
+/// The maximum number of elements in all computed tensors, and of multiplications: about
+/// ten times those of the largest person detector.
+const MOST_COMPUTED: usize = 1 << 29;
+const MOST_WORK: usize = 1 << 36;
+
+/// Counts what a network that is being read will compute, up to the limits.
+#[derive(Debug, Default)]
+pub(super) struct Effort {
+    computed: usize,
+    work: usize,
+}
+
+impl Effort {
+    /// Adds an operator with inputs of these shapes and so many outputs.
+    pub fn add(
+        &mut self,
+        operator: &Operator,
+        inputs: &[&[usize]],
+        size: usize,
+    ) -> Result<(), NetworkError> {
+        self.computed = self.computed.saturating_add(size);
+        self.work = self.work.saturating_add(operator.work(inputs, size));
+        if self.computed > MOST_COMPUTED || self.work > MOST_WORK {
+            return Err(NetworkError::TooLarge("it needs too many operations".into()));
+        }
+        Ok(())
+    }
+
+    /// Returns the network of operators that were added, each after those it reads.
+    pub fn network(
+        self,
+        layers: Vec<Layer>,
+        shapes: Vec<Vec<usize>>,
+        constants: HashMap<usize, Vec<f32>>,
+        input: usize,
+        outputs: Vec<usize>,
+    ) -> Network {
+        let mut last = vec![0; shapes.len()];
+        layers.iter().enumerate().for_each(|(i, s)| s.inputs.iter().for_each(|t| last[*t] = i));
+        outputs.iter().for_each(|o| last[*o] = usize::MAX);
+        Network { layers, shapes, constants, input, outputs, last, work: self.work }
+    }
+}
+
 impl Network {
-    /// The shape of the input: 1, height, width, channels.
+    /// The shape of the input, usually 1, height, width, channels.
     pub fn input_shape(&self) -> &[usize] {
         &self.shapes[self.input]
     }
@@ -42,8 +88,8 @@ impl Network {
         self.work
     }
 
-    /// Returns the outputs for an input, in the file's order. Tensors are laid out by
-    /// rows of pixels from the top, with a pixel's channels together.
+    /// Returns the outputs for an input, in the file's order. Numbers are in the
+    /// order of their shape, those along its last dimension together.
     ///
     /// # Errors
     /// If the input's length does not match its shape.

@@ -10,9 +10,12 @@ pub(super) enum Operator {
     Convolution(Convolution),
     Depthwise(Depthwise),
     Transposed(Transposed),
-    /// Zeros around an image: the numbers above, to the left, and before the first
+    /// A value around an image: the numbers above, to the left, and before the first
     /// channel.
-    Pad([usize; 3]),
+    Pad {
+        before: [usize; 3],
+        value: f32,
+    },
     Pool {
         window: Window,
         largest: bool,
@@ -30,7 +33,16 @@ pub(super) enum Operator {
     Multiply(Clip),
     Sigmoid,
     Relu,
+    /// Multiplies negative numbers by this, from 0 to 1.
+    LeakyRelu(f32),
     HardSwish,
+    /// The part of a tensor along a dimension, from an index on.
+    Slice {
+        along: usize,
+        start: usize,
+    },
+    /// Reorders dimensions: that dimension of the input is at this place of the output.
+    Transpose(Vec<usize>),
 }
 
 /// A tensor during a run.
@@ -55,8 +67,8 @@ impl Operator {
             (Operator::Convolution(c), Some((from, to))) => c.run(first.values, from, to, out),
             (Operator::Depthwise(c), Some((from, to))) => c.run(first.values, from, to, out),
             (Operator::Transposed(c), Some((from, to))) => c.run(first.values, from, to, out),
-            (Operator::Pad(before), Some((from, to))) => {
-                resampling::pad(first.values, from, to, *before, out)
+            (Operator::Pad { before, value }, Some((from, to))) => {
+                resampling::pad(first.values, from, to, *before, *value, out)
             }
             (Operator::Pool { window, largest, clip }, Some((from, to))) => {
                 resampling::pool(first.values, from, to, window, *largest, out);
@@ -85,6 +97,9 @@ impl Operator {
             (Operator::Reshape, _) => out.copy_from_slice(first.values),
             (Operator::Sigmoid, _) => each(first.values, out, sigmoid),
             (Operator::Relu, _) => each(first.values, out, |x| x.max(0.0)),
+            (Operator::LeakyRelu(slope), _) => each(first.values, out, |x| x.max(slope * x)),
+            (Operator::Slice { along, start }, _) => slice(*first, shape, *along, *start, out),
+            (Operator::Transpose(order), _) => transpose(*first, shape, order, out),
             (Operator::HardSwish, _) => {
                 each(first.values, out, |x| x * (x + 3.0).clamp(0.0, 6.0) / 6.0)
             }
@@ -132,6 +147,39 @@ fn concatenate(inputs: &[Tensor], along: usize, out: &mut [f32]) {
             let n = run(t);
             line[at..at + n].copy_from_slice(&t.values[i * n..(i + 1) * n]);
             at += n;
+        }
+    }
+}
+
+/// Copies the part of a tensor that starts at an index of a dimension and has this shape.
+fn slice(t: Tensor, shape: &[usize], along: usize, start: usize, out: &mut [f32]) {
+    let inner: usize = shape[along + 1..].iter().product();
+    let (part, whole) = (shape[along] * inner, t.shape[along] * inner);
+    for (out, line) in out.chunks_exact_mut(part).zip(t.values.chunks_exact(whole)) {
+        out.copy_from_slice(&line[start * inner..][..part]);
+    }
+}
+
+/// Reorders the dimensions of a tensor to get this shape.
+fn transpose(t: Tensor, shape: &[usize], order: &[usize], out: &mut [f32]) {
+    let strides: Vec<usize> =
+        order.iter().map(|d| t.shape[d + 1..].iter().product::<usize>()).collect();
+    let (Some((last, outer)), Some(step)) = (shape.split_last(), strides.last()) else {
+        return out.copy_from_slice(t.values);
+    };
+    let mut index = vec![0; outer.len()];
+    let mut at = 0;
+    for line in out.chunks_exact_mut(*last) {
+        line.iter_mut().enumerate().for_each(|(i, o)| *o = t.values[at + i * step]);
+        // The next line: the last outer dimension runs fastest.
+        for d in (0..outer.len()).rev() {
+            index[d] += 1;
+            at += strides[d];
+            if index[d] < outer[d] {
+                break;
+            }
+            at -= index[d] * strides[d];
+            index[d] = 0;
         }
     }
 }

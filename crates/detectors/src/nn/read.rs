@@ -5,14 +5,9 @@ use super::NetworkError;
 use super::assemble::{Entry, Rejection};
 use super::file::{File, format};
 use super::flatbuffer::Table;
-use super::network::{Layer, Network};
+use super::network::{Effort, Layer, Network};
 use super::schema::{code, field};
 use std::collections::{HashMap, HashSet};
-
-/// The maximum number of elements in all computed tensors, and of multiplications: about
-/// ten times those of the largest person detector.
-const MOST_COMPUTED: usize = 1 << 29;
-const MOST_WORK: usize = 1 << 36;
 
 impl Network {
     /// Reads the network in a `.tflite` file.
@@ -34,7 +29,7 @@ impl Network {
 
         let (mut layers, mut filled, mut constants) =
             (Vec::<Layer>::new(), HashSet::from([input]), HashMap::new());
-        let (mut computed, mut work) = (0usize, 0usize);
+        let mut effort = Effort::default();
         for (index, table) in graph.tables(field::graph::OPERATORS)?.iter().enumerate() {
             let entry = entry(&file, &codes, table)?;
             let wrong =
@@ -64,21 +59,14 @@ impl Network {
             }
             let read: Vec<&[usize]> = inputs.iter().map(|t| &file.shapes[*t][..]).collect();
             let size: usize = file.shapes[entry.output].iter().product();
-            computed = computed.saturating_add(size);
-            work = work.saturating_add(operator.work(&read, size));
-            if computed > MOST_COMPUTED || work > MOST_WORK {
-                return Err(NetworkError::TooLarge("it needs too many operations".into()));
-            }
+            effort.add(&operator, &read, size)?;
             layers.push(Layer { operator, inputs, output: entry.output });
         }
         let outputs = graph.indices(field::graph::OUTPUTS)?;
         if outputs.is_empty() || outputs.iter().any(|o| !filled.contains(o)) {
             return Err(format("an output is never computed"));
         }
-        let mut last = vec![0; file.shapes.len()];
-        layers.iter().enumerate().for_each(|(i, s)| s.inputs.iter().for_each(|t| last[*t] = i));
-        outputs.iter().for_each(|o| last[*o] = usize::MAX);
-        Ok(Network { layers, shapes: file.shapes, constants, input, outputs, last, work })
+        Ok(effort.network(layers, file.shapes, constants, input, outputs))
     }
 }
 

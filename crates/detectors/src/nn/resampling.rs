@@ -4,9 +4,16 @@
 use super::shape::{Size, Window};
 
 /// Copies an image into a larger one, offset by `before` rows, columns and channels; the
-/// rest is zero.
-pub(super) fn pad(input: &[f32], from: Size, to: Size, before: [usize; 3], out: &mut [f32]) {
-    out.fill(0.0);
+/// rest is `value`.
+pub(super) fn pad(
+    input: &[f32],
+    from: Size,
+    to: Size,
+    before: [usize; 3],
+    value: f32,
+    out: &mut [f32],
+) {
+    out.fill(value);
     for row in 0..from.height {
         for column in 0..from.width {
             let pixel = to.pixel_mut(out, row + before[0], column + before[1]);

@@ -109,8 +109,10 @@ pub(super) struct Clip {
 }
 
 impl Clip {
+    pub const NONE: Clip = Clip { lo: f32::NEG_INFINITY, hi: f32::INFINITY };
+
     pub fn apply(self, values: &mut [f32]) {
-        if self.lo > f32::NEG_INFINITY || self.hi < f32::INFINITY {
+        if self != Clip::NONE {
             values.iter_mut().for_each(|v| *v = v.max(self.lo).min(self.hi));
         }
     }

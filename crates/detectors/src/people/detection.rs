@@ -2,6 +2,7 @@
 //! 2016; MediaPipe's `pose_detection`).
 
 use super::window::{Beyond, Window};
+use crate::boxes::overlap;
 use crate::nn::{Network, NetworkError, sigmoid};
 use pcadlang_scene::vision::Photo;
 
@@ -31,6 +32,14 @@ pub(super) struct Detection {
 struct Candidate {
     score: f64,
     numbers: [f64; NUMBERS],
+}
+
+impl Candidate {
+    /// Returns the sides of its box.
+    fn sides(&self) -> [f64; 4] {
+        let [left, top, right, bottom, ..] = self.numbers;
+        [left, top, right, bottom]
+    }
 }
 
 /// The centres of all anchors, in the order of the network's outputs.
@@ -98,7 +107,7 @@ fn people(mut all: Vec<Candidate>) -> Vec<Candidate> {
     let mut out = Vec::new();
     while let Some(best) = all.first().copied() {
         let (same, rest): (Vec<_>, Vec<_>) =
-            all.iter().skip(1).partition(|c| overlap(&c.numbers, &best.numbers) > OVERLAP);
+            all.iter().skip(1).partition(|c| overlap(c.sides(), best.sides()) > OVERLAP);
         let (mut sums, mut total) = ([0.0; NUMBERS], 0.0);
         for c in [best].iter().chain(&same) {
             sums.iter_mut().zip(&c.numbers).for_each(|(s, n)| *s += c.score * n);
@@ -108,39 +117,4 @@ fn people(mut all: Vec<Candidate>) -> Vec<Candidate> {
         all = rest;
     }
     out
-}
-
-/// Intersection over union of two boxes.
-fn overlap(a: &[f64; NUMBERS], b: &[f64; NUMBERS]) -> f64 {
-    let area = |l: f64, t: f64, r: f64, b: f64| (r - l).max(0.0) * (b - t).max(0.0);
-    let both = area(a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3]));
-    both / (area(a[0], a[1], a[2], a[3]) + area(b[0], b[1], b[2], b[3]) - both).max(1e-12)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn overlap_is_intersection_over_union() {
-        let of = |a: [f64; 4], b: [f64; 4]| {
-            // The points that follow a box's sides do not matter.
-            let with_points = |sides: [f64; 4]| -> [f64; NUMBERS] {
-                std::array::from_fn(|i| sides.get(i).copied().unwrap_or(9.0))
-            };
-            let (a, b) = (with_points(a), with_points(b));
-            assert_eq!(overlap(&a, &b), overlap(&b, &a));
-            overlap(&a, &b)
-        };
-        let unit = [0.0, 0.0, 1.0, 1.0];
-        assert_eq!(of(unit, unit), 1.0);
-        assert_eq!(of(unit, [0.5, 0.0, 1.5, 1.0]), 0.5 / 1.5);
-        assert_eq!(of(unit, [0.0, 0.5, 1.0, 1.5]), 0.5 / 1.5);
-        assert_eq!(of(unit, [0.5, 0.5, 1.5, 2.5]), 0.25 / 2.75);
-        assert_eq!(of([-1.0, -1.0, 1.0, 1.0], [-0.5, -0.5, 0.5, 0.0]), 0.5 / 4.0);
-        // Beside it, above it, and without an area.
-        assert_eq!(of(unit, [2.0, 0.0, 3.0, 1.0]), 0.0);
-        assert_eq!(of(unit, [0.0, -2.0, 1.0, -1.0]), 0.0);
-        assert_eq!(of([0.5; 4], [0.5; 4]), 0.0);
-    }
 }

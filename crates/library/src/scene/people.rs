@@ -3,6 +3,7 @@
 use super::hint::{self, HINT};
 use super::observed::{KeypointsValue, MaskValue, PeopleKey};
 use super::{IMAGE, ImageValue, native};
+use pcadlang_detectors::boxes::overlap;
 use pcadlang_detectors::people::{FindOptions, Person, networks};
 use pcadlang_engine::lang::builtins::{Row, Type, arg, int};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
@@ -67,8 +68,8 @@ pub(super) fn order(
 ) -> Vec<usize> {
     let mut order: Vec<usize> = (0..found.len()).collect();
     let wanted = hint.around(width, height).map(|[x, y, w, h]| [x, y, x + w, y + h]);
-    let overlap = |(p, _): &(Person, Value)| wanted.map_or(0.0, |w| shared(p.bounds, w));
-    let overlap: Vec<f64> = found.iter().map(overlap).collect();
+    let filled = |(p, _): &(Person, Value)| wanted.map_or(0.0, |w| overlap(p.bounds, w));
+    let filled: Vec<f64> = found.iter().map(filled).collect();
     let count = |positions: &[[f64; 2]]| {
         let mut counts = vec![0_u32; found.len()];
         for p in positions {
@@ -83,7 +84,7 @@ pub(super) fn order(
     let (on, beside) = (count(&hint.at), count(&hint.not));
     order.sort_by(|i, j| {
         let positions = beside[*i].cmp(&beside[*j]).then(on[*j].cmp(&on[*i]));
-        positions.then(overlap[*j].total_cmp(&overlap[*i]))
+        positions.then(filled[*j].total_cmp(&filled[*i]))
     });
     order
 }
@@ -103,13 +104,6 @@ fn on_mask(person: &Value, at: [f64; 2]) -> bool {
 /// Returns whether a position is within a box of left, top, right and bottom.
 fn within([left, top, right, bottom]: [f64; 4], [x, y]: [f64; 2]) -> bool {
     (left..=right).contains(&x) && (top..=bottom).contains(&y)
-}
-
-/// The intersection of two boxes as a fraction of their union.
-fn shared(a: [f64; 4], b: [f64; 4]) -> f64 {
-    let area = |[l, t, r, b]: [f64; 4]| (r - l).max(0.0) * (b - t).max(0.0);
-    let both = area([a[0].max(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].min(b[3])]);
-    both / (area(a) + area(b) - both).max(1e-9)
 }
 
 fn number(x: f64) -> Value {

@@ -5,7 +5,7 @@ use crate::nn::resampling::{Alignment, depth_to_space, mean, pad, pool, resize};
 use crate::nn::shape::{Clip, Size, Window};
 use pcadlang_numerics::num::simd::portable;
 
-const FREE: Clip = Clip { lo: f32::NEG_INFINITY, hi: f32::INFINITY };
+const FREE: Clip = Clip::NONE;
 
 /// Returns pseudo-random numbers from -1 to 1.
 fn numbers(n: usize, seed: u32) -> Vec<f32> {
@@ -180,7 +180,7 @@ fn pictures_of_other_sizes() {
     let (from, to) =
         (Size { height: 2, width: 2, channels: 1 }, Size { height: 3, width: 4, channels: 2 });
     let mut out = vec![9.0; to.len()];
-    pad(&[1.0, 2.0, 3.0, 4.0], from, to, [1, 2, 1], &mut out);
+    pad(&[1.0, 2.0, 3.0, 4.0], from, to, [1, 2, 1], 0.0, &mut out);
     let places: Vec<(usize, f32)> =
         out.iter().copied().enumerate().filter(|(_, v)| *v != 0.0).collect();
     assert_eq!(places, [(13, 1.0), (15, 2.0), (21, 3.0), (23, 4.0)]);

@@ -1,0 +1,111 @@
+//! Finds objects of the 80 classes of COCO in a photograph, by NanoDet (RangiLyu 2020): one
+//! run of a small network on the photograph shrunk to 416 pixels.
+//!
+//! The result is a function of the photograph alone, with the same bits on any machine. The
+//! network itself is in `pcadlang-nanodet`.
+
+mod boxes;
+mod classes;
+pub mod json;
+pub mod networks;
+mod sample;
+#[cfg(test)]
+mod tests;
+
+pub use classes::CLASSES;
+
+use crate::nn::{Network, NetworkError};
+use pcadlang_scene::vision::Photo;
+
+/// The side of the network's input, in samples.
+const SIDE: usize = 416;
+/// The distances between cells, in samples.
+const STRIDES: [usize; 3] = [8, 16, 32];
+/// The number of distances that each side of a box is a mixture of, in strides: 0 to 10.
+const BINS: usize = 11;
+
+/// Options of the search for objects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObjectOptions {
+    /// The minimum score, 0 to 1.
+    pub least: f64,
+    /// The maximum number of objects.
+    pub most: usize,
+}
+
+impl Default for ObjectOptions {
+    fn default() -> Self {
+        ObjectOptions { least: 0.3, most: 20 }
+    }
+}
+
+/// An object in a photograph.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoundObject {
+    /// Left, top, right and bottom, in pixels of the photograph from its upper left corner;
+    /// within it, and the right and bottom larger.
+    pub bounds: [f64; 4],
+    /// The index of its class in [`CLASSES`].
+    pub class: usize,
+    /// How likely the network takes it to be an object of its class: 0 to 1.
+    pub score: f64,
+}
+
+impl FoundObject {
+    /// The name of its class.
+    pub fn name(&self) -> &'static str {
+        CLASSES[self.class].0
+    }
+}
+
+/// The network that detects objects.
+#[derive(Debug)]
+pub struct ObjectFinder {
+    network: Network,
+    /// For each stride, which outputs are the scores and the sides of boxes.
+    outputs: [[usize; 2]; 3],
+}
+
+impl ObjectFinder {
+    /// Reads NanoDet from a graph model of TensorFlow.js: the bytes of its JSON and of its
+    /// weights.
+    ///
+    /// # Errors
+    /// If the files cannot be read, or contain a different network.
+    pub fn new(json: &[u8], weights: &[u8]) -> Result<ObjectFinder, NetworkError> {
+        let network = Network::read_graph_model(json, weights)?;
+        let outputs = outputs(&network).filter(|_| network.input_shape() == [1, 3, SIDE, SIDE]);
+        let outputs = outputs.ok_or_else(|| {
+            NetworkError::Format("it is not a detector of objects (nanodet.json)".into())
+        })?;
+        Ok(ObjectFinder { network, outputs })
+    }
+
+    /// Returns the objects in a photograph, those with the highest scores first.
+    ///
+    /// # Errors
+    /// Errors of the network, which valid ones do not have.
+    pub fn find(
+        &self,
+        photo: &Photo,
+        options: &ObjectOptions,
+    ) -> Result<Vec<FoundObject>, NetworkError> {
+        let (input, scale) = sample::letterbox(photo, SIDE);
+        let outputs = self.network.run(input)?;
+        let grids = self.outputs.map(|pair| pair.map(|i| &outputs[i][..]));
+        let size = [photo.width(), photo.height()].map(f64::from);
+        let found = boxes::decode(&grids, scale, size, options.least);
+        Ok(boxes::best(found, options.most))
+    }
+}
+
+/// Returns which outputs are the scores and the sides of boxes for each stride, by their
+/// shapes.
+fn outputs(network: &Network) -> Option<[[usize; 2]; 3]> {
+    let find = |stride: usize, numbers: usize| {
+        let cells = (SIDE / stride) * (SIDE / stride);
+        network.output_shapes().position(|s| s == [1, cells, numbers])
+    };
+    let [a, b, c] = STRIDES.map(|s| Some([find(s, CLASSES.len())?, find(s, 4 * BINS)?]));
+    Some([a?, b?, c?])
+}
