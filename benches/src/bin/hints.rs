@@ -17,7 +17,7 @@
 //! then the mean and the median of the cases and how many reach 0.8.
 
 use pcadlang_numerics::rng::{Purpose, Stream, StreamKey};
-use pcadlang_scene::vision::segmentation::mask_axes;
+use pcadlang_scene::vision::segmentation::from_mask;
 use pcadlang_scene::vision::{Limits, Mask, distance_transform, mask, photo};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -186,7 +186,7 @@ fn hint(kind: &str, case: &Case) -> Result<Vec<String>, String> {
         "axis" => {
             let bytes = std::fs::read(&case.image).map_err(|e| e.to_string())?;
             let photo = photo::decode(&bytes, &Limits::default()).map_err(|e| e.to_string())?;
-            let axes = mask_axes(&photo, m);
+            let axes = from_mask(&photo, m);
             // Of nearly equally good axes, the more upright one is the user's.
             let best = axes.iter().map(|a| a.symmetry).fold(0.0, f64::max);
             let lean = |a: &&pcadlang_scene::vision::candidates::Axis| {

@@ -25,6 +25,8 @@ static FILES: Shipped = &[
     ("lathe_paper.pcad", include_str!("../../../programs/lathe_paper.pcad")),
     ("scene.pcad", include_str!("../../../programs/scene.pcad")),
     ("std/scene.pcad", include_str!("../../../programs/std/scene.pcad")),
+    ("std/revolution.pcad", include_str!("../../../programs/std/revolution.pcad")),
+    ("std/people.pcad", include_str!("../../../programs/std/people.pcad")),
     ("std/human/human.obj", include_str!("../../../programs/std/human/human.obj")),
     ("std/human/human.rig.json", include_str!("../../../programs/std/human/human.rig.json")),
     ("std/human/human.morphs.json", include_str!("../../../programs/std/human/human.morphs.json")),

@@ -1,16 +1,17 @@
-//! Candidate objects of revolution in a photograph, as values: a thin layer over
-//! [`pcadlang_scene::vision::candidates`].
+//! Places in a photograph where an object of revolution may be, as values: a thin layer over
+//! [`super::places`].
 
+use super::hint::{HINT, asked};
 use super::observed::MaskValue;
+use super::places::Place;
 use super::seeing::camera;
 use super::{CAMERA, IMAGE, ImageValue, native};
 use glam::DVec3;
 use pcadlang_engine::lang::builtins::{Row, Type, arg, int, opt};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::render::{Camera, Projection};
-use pcadlang_scene::vision::candidates::{
-    Axis, Candidate, CandidateOptions, candidates, enclosed, tilts,
-};
+use pcadlang_scene::vision::Mask;
+use pcadlang_scene::vision::candidates::{Axis, CandidateOptions, tilts};
 use std::sync::Arc;
 
 pub(super) const TABLE: &[Row] = &[native(
@@ -22,29 +23,36 @@ pub(super) const TABLE: &[Row] = &[native(
             IMAGE,
             "The photograph; from a contour map alone, the enclosed regions are used.",
         ),
-        int("most", 20, [1, 64], "The maximum number of candidates."),
+        int("most", 20, [1, 64], "The maximum number of regions."),
         int(
             "size",
             128,
             [32, 512],
-            "The longer side of the picture that is analysed; 256 for a contour map.",
+            "The longer side of the picture in which regions are searched; 256 for a contour map.",
         )
         .unit("pixels"),
         opt("camera", CAMERA, "the run's", "The camera; by default, that of the run."),
+        HINT,
     ],
     Type::Array,
-    "Regions of a photograph that may be objects of revolution, the most probable first. Each is \
-     a record: `score`; `mask`; `axes`, one or two records, the more symmetric first: `symmetry`, \
-     0 to 1; the ends `foot` and `top`, in a fronto-parallel plane at about the distance of the \
-     origin; their distance `length`; the unit vectors `along`, from foot to top, and `toward` \
-     the camera, which is at `distance`; `widths`, 24 half-widths from foot to top; `tilts`, 80 \
-     angles by which the axis may be turned towards the camera, radians, and `rims`, the evidence \
-     for each of them, 0 to 1: whether a flat end would appear as an ellipse of that height. \
-     Lengths are in scene units. Depends only on the picture and the camera, and is computed \
-     once.",
+    "Places in a photograph where an object of revolution may be, the most probable first: the one \
+     that the hint points out, by a mask or an outline, an axis, or a box; or else up to three boxes \
+     of vessels and fruit that the built-in detector sees, or of anything at a click, and regions \
+     that are nearly mirror-symmetric. Each is a record: `score`, its probability; `source`, \
+     \"drawn\", \"axis\", \"box\", the class that the detector sees, or \"region\"; `box`, [x, y, \
+     width, height] in pixels, or [] if none points to it; `masks`, the outline that was drawn, or \
+     two guesses of it, by a symmetric outline and by a graph cut, or none for a region; `axes`, \
+     records with a `weight`, all of a place adding up to 1; `symmetry`, 0 to 1; the ends `foot` and \
+     `top`, in a fronto-parallel plane at about the distance of the origin; their distance `length`; \
+     the unit vectors `along`, from foot to top, and `toward` the camera, which is at `distance`; \
+     `widths`, 24 half-widths from foot to top; `tilts`, 80 angles by which the axis may be turned \
+     towards the camera, radians, and `rims`, the evidence for each of them, 0 to 1: whether a flat \
+     end would appear as an ellipse of that height. Lengths are in scene units. Depends only on the \
+     picture, the hint and the camera, and is computed once.",
     |a| {
         if matches!(a.values.first(), Some(Value::Unit)) {
-            return Ok(Value::List(Arc::from([])));
+            let nowhere = value(&Place::anywhere(1.0), &Camera::default_for(1, 1), [1.0; 2]);
+            return Ok(Value::List(Arc::from([nowhere])));
         }
         let image = a.object::<ImageValue>(0, "an image")?;
         let (width, height) = image.size();
@@ -55,31 +63,31 @@ pub(super) const TABLE: &[Row] = &[native(
         };
         let camera = camera(a, (width, height))?;
         let options = CandidateOptions { most: a.int("most")? as usize, size };
-        let found = image.prepared().get(options, |o| match image.as_photo() {
-            Some(photo) => Ok(candidates(photo, o)),
-            None => Ok(enclosed(image.map()?, o)),
-        });
-        let found: Arc<Vec<Candidate>> = found.map_err(|f| f.of("scene.candidates"))?;
+        let found = image.places(&options, &*asked(a, image)?);
+        let found: Arc<Vec<Place>> = found.map_err(|f| f.of("scene.candidates"))?;
         let scale = [
             f64::from(camera.width) / f64::from(width.max(1)),
             f64::from(camera.height) / f64::from(height.max(1)),
         ];
-        Ok(Value::List(found.iter().map(|c| value(c, &camera, scale)).collect()))
+        Ok(Value::List(found.iter().map(|p| value(p, &camera, scale)).collect()))
     },
 )];
 
-/// Converts a candidate to a record; `scale` is the size of a photograph's pixel in
-/// pixels of the camera.
-fn value(c: &Candidate, camera: &Camera, scale: [f64; 2]) -> Value {
-    let axes = c.axes.iter().map(|a| axis(a, camera, scale)).collect();
+/// Converts a place to a record; `scale` is the size of a photograph's pixel in pixels of
+/// the camera.
+fn value(p: &Place, camera: &Camera, scale: [f64; 2]) -> Value {
+    let axes = p.axes.iter().map(|(a, weight)| axis(a, *weight, camera, scale)).collect();
+    let mask = |m: &Mask| Value::object(MaskValue::new(m.clone()));
     Value::record([
-        ("score", Value::Num(c.score)),
-        ("mask", Value::object(MaskValue::new(c.mask.clone()))),
+        ("score", Value::Num(p.score)),
+        ("source", Value::str(&p.source)),
+        ("box", Value::array(p.bounds.map_or(Vec::new(), |b| b.to_vec()))),
+        ("masks", Value::List(p.masks.iter().map(mask).collect())),
         ("axes", Value::List(axes)),
     ])
 }
 
-fn axis(a: &Axis, camera: &Camera, scale: [f64; 2]) -> Value {
+fn axis(a: &Axis, weight: f64, camera: &Camera, scale: [f64; 2]) -> Value {
     // The midpoint of the axis is placed at the depth of the origin; the axis lies in the
     // plane through it that faces the camera.
     let depth = (-camera.eye).dot(camera.forward).max(Camera::NEAR);
@@ -109,6 +117,7 @@ fn axis(a: &Axis, camera: &Camera, scale: [f64; 2]) -> Value {
     };
     let vector = |v: DVec3| Value::array(v.to_array().to_vec());
     Value::record([
+        ("weight", Value::Num(weight)),
         ("symmetry", Value::Num(a.symmetry)),
         ("foot", vector(foot)),
         ("top", vector(top)),
@@ -147,7 +156,7 @@ mod tests {
             let (mx, my) = (0.5 * (foot[0] + top[0]), 0.5 * (foot[1] + top[1]));
             let width = ((x - mx) * uy - (y - my) * ux).abs() / f64::hypot(ux, uy);
             let seen = Axis { symmetry: 1.0, foot, top, widths: vec![width], rims: Vec::new() };
-            let made = axis(&seen, &camera, [1.0, 1.0]);
+            let made = axis(&seen, 1.0, &camera, [1.0, 1.0]);
             let Value::Record(fields) = &made else { panic!("no record") };
             let number = |name: &str| match fields.get(name) {
                 Some(Value::Num(x)) => *x,

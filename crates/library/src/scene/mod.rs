@@ -18,6 +18,7 @@ mod inputs;
 mod objects;
 mod observed;
 mod people;
+pub mod places;
 mod region;
 mod scene_view;
 mod seeing;

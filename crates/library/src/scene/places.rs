@@ -1,10 +1,10 @@
 //! Places in a photograph where an object of revolution may be: where the user points, in
 //! the boxes of a detector, or in regions that are nearly mirror-symmetric.
 
-use pcadlang_detectors::objects::{FindOptions, FoundObject, networks};
+use pcadlang_detectors::objects::{FoundObject, ObjectOptions, networks};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_scene::vision::candidates::{Axis, Candidate, CandidateOptions, candidates};
-use pcadlang_scene::vision::segmentation::{Guess, Method, guesses, mask_axes};
+use pcadlang_scene::vision::segmentation::{Guess, Method, guesses, from_mask};
 use pcadlang_scene::vision::{Hint, Mask, Photo};
 
 /// The classes of COCO that are objects of revolution.
@@ -12,8 +12,8 @@ const ROUND: [&str; 7] = ["bottle", "wine glass", "cup", "bowl", "apple", "orang
 /// The maximum number of boxes of the detector.
 const BOXES: usize = 3;
 /// The minimum score of a box, and of one that a click points out.
-const LEAST: f32 = 0.2;
-const LEAST_CLICKED: f32 = 0.05;
+const LEAST: f64 = 0.2;
+const LEAST_CLICKED: f64 = 0.05;
 /// The weight of all regions together, beside boxes.
 const REGIONS: f64 = 0.25;
 /// Each side of the picture that a box touches multiplies its weight by this.
@@ -51,14 +51,14 @@ impl Place {
     }
 
     fn region(c: &Candidate, score: f64) -> Place {
-        let weights = [0.8, 0.2].into_iter();
-        Place {
-            score,
-            source: "region".into(),
-            bounds: None,
-            masks: Vec::new(),
-            axes: normalised(c.axes.iter().cloned().zip(weights).collect()),
-        }
+        let axes = c.axes.iter().cloned().zip([0.8, 0.2]).collect();
+        Place { axes: normalised(axes), ..Place::anywhere(score) }
+    }
+
+    /// A place that nothing points to.
+    pub(super) fn anywhere(score: f64) -> Place {
+        let (source, bounds, masks, axes) = ("region".into(), None, Vec::new(), Vec::new());
+        Place { score, source, bounds, masks, axes }
     }
 }
 
@@ -74,7 +74,7 @@ fn normalised(mut axes: Vec<(Axis, f64)>) -> Vec<(Axis, f64)> {
 /// Those of the detector.
 pub fn places(photo: &Photo, hint: &Hint, options: &CandidateOptions) -> Result<Vec<Place>, Fault> {
     if let Some(mask) = hint.drawn(photo.width(), photo.height()) {
-        let axes = mask_axes(photo, &mask).into_iter().zip([0.8, 0.2]).collect();
+        let axes = from_mask(photo, &mask).into_iter().zip([0.8, 0.2]).collect();
         let (source, bounds) = ("drawn".into(), None);
         let masks = vec![mask];
         return Ok(vec![Place { score: 1.0, source, bounds, masks, axes: normalised(axes) }]);
@@ -88,13 +88,11 @@ pub fn places(photo: &Photo, hint: &Hint, options: &CandidateOptions) -> Result<
         let [l, t, r, b] = o.bounds;
         let bounds = Some([l, t, r - l, b - t]);
         let all = guesses(photo, &Hint { bounds, ..hint.clone() });
-        Place::guessed(o.class, *weight, bounds, &all)
+        Place::guessed(o.name(), *weight, bounds, &all)
     });
     let mut all: Vec<Place> = seen.collect();
     let weight = |places: &[Place]| places.iter().map(|p| p.score).sum::<f64>();
     let seen = weight(&all);
-    let regions = regions(photo, hint, options);
-    let total = regions.iter().map(|c| c.score).sum::<f64>().max(f64::MIN_POSITIVE);
     // A click on a box that is seen leaves no doubt.
     let share = match (all.is_empty(), hint.at.is_empty()) {
         (true, _) => 1.0,
@@ -103,7 +101,7 @@ pub fn places(photo: &Photo, hint: &Hint, options: &CandidateOptions) -> Result<
     };
     all.iter_mut().for_each(|p| p.score *= (1.0 - share) / seen);
     if share > 0.0 {
-        all.extend(regions.iter().map(|c| Place::region(c, share * c.score / total)));
+        all.extend(regions(&meant(candidates(photo, options), photo, hint), share));
     }
     Ok(all)
 }
@@ -113,7 +111,7 @@ fn boxes(photo: &Photo, hint: &Hint) -> Result<Vec<(FoundObject, f64)>, Fault> {
     let fault = |why: String| Fault::new(FaultKind::Other, why);
     let clicked = !hint.at.is_empty();
     let least = if clicked { LEAST_CLICKED } else { LEAST };
-    let options = FindOptions { least, ..FindOptions::default() };
+    let options = ObjectOptions { least, ..ObjectOptions::default() };
     let finder = networks::finder().map_err(|why| fault(why.into()))?;
     let found = finder.find(photo, &options).map_err(|e| fault(e.to_string()))?;
     let inside = |o: &FoundObject, [x, y]: [f64; 2]| {
@@ -121,7 +119,7 @@ fn boxes(photo: &Photo, hint: &Hint) -> Result<Vec<(FoundObject, f64)>, Fault> {
         (l..=r).contains(&x) && (t..=b).contains(&y)
     };
     let meant = |o: &FoundObject| {
-        (clicked || ROUND.contains(&o.class))
+        (clicked || ROUND.contains(&o.name()))
             && hint.at.iter().all(|p| inside(o, *p))
             && !hint.not.iter().any(|p| inside(o, *p))
     };
@@ -129,36 +127,44 @@ fn boxes(photo: &Photo, hint: &Hint) -> Result<Vec<(FoundObject, f64)>, Fault> {
     let weight = |o: &FoundObject| {
         let [l, t, r, b] = o.bounds;
         if clicked {
-            return f64::from(o.score);
+            return o.score;
         }
         let off = [0.5 * (l + r) / width - 0.5, 0.5 * (t + b) / height - 0.5];
         let central = libm::exp(-2.0 * (off[0] * off[0] + off[1] * off[1]));
         let area = (r - l) * (b - t) / (width * height);
         let touched = [l < 0.01 * width, t < 0.01 * height, r > 0.99 * width, b > 0.99 * height];
         let cut_off = touched.into_iter().filter(|t| *t).map(|_| CUT_OFF).product::<f64>();
-        f64::from(o.score) * central * area.sqrt().sqrt() * cut_off
+        o.score * central * area.sqrt().sqrt() * cut_off
     };
     let mut all: Vec<(FoundObject, f64)> =
-        found.into_iter().filter(meant).map(|o| (o.clone(), weight(&o))).collect();
+        found.into_iter().filter(meant).map(|o| (o, weight(&o))).collect();
     all.sort_by(|a, b| b.1.total_cmp(&a.1));
     all.truncate(BOXES);
     Ok(all)
 }
 
-/// Returns the regions that may be meant.
-fn regions(photo: &Photo, hint: &Hint, options: &CandidateOptions) -> Vec<Candidate> {
-    let mut all = candidates(photo, options);
+/// Returns regions as places, the weights of which add up to `share`.
+pub(super) fn regions(all: &[Candidate], share: f64) -> Vec<Place> {
+    let total = all.iter().map(|c| c.score).sum::<f64>();
+    match all {
+        [] => vec![Place::anywhere(share)],
+        _ => all.iter().map(|c| Place::region(c, share * c.score / total)).collect(),
+    }
+}
+
+/// Returns the regions that clicks leave open; all of them if none fits.
+fn meant(mut all: Vec<Candidate>, photo: &Photo, hint: &Hint) -> Vec<Candidate> {
     let has = |c: &Candidate, [x, y]: [f64; 2]| {
         let (w, h) = (c.mask.width(), c.mask.height());
         let column = (x / f64::from(photo.width()) * f64::from(w)) as u32;
         let row = (y / f64::from(photo.height()) * f64::from(h)) as u32;
         c.mask.data()[(row.min(h - 1) * w + column.min(w - 1)) as usize]
     };
-    let meant = |c: &Candidate| {
+    let fits = |c: &Candidate| {
         hint.at.iter().all(|p| has(c, *p)) && !hint.not.iter().any(|p| has(c, *p))
     };
-    if all.iter().any(meant) {
-        all.retain(meant);
+    if all.iter().any(fits) {
+        all.retain(fits);
     }
     all
 }
