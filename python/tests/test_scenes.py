@@ -62,7 +62,7 @@ def test_hints_reach_the_program() -> None:
         data photo: image;
         let h = scene.hint(photo);
         assume seen = concat(h.box, h.axis.foot, h.axis.top, [h.axis.width], h.at[0], h.not[1]);
-        assume n = len(h.outline) + if h.drawn { 1 } else { 0 };
+        assume n = len(h.outline) + (if h.drawn { 1 } else { 0 });
         assume x ~ normal(0, 1);"""
     photo = np.zeros((40, 60, 3), np.uint8)
     mask = np.zeros((20, 30), bool)
