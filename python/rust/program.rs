@@ -118,7 +118,7 @@ impl Program {
         let mask = mask.map(drawn).transpose()?;
         let hint = Hint { mask, outline, bounds: r#box, axis, at, not: not_ };
         let hinted = self.program.clone().hint(hint);
-        hinted.map(|p| self.changed(p)).map_err(|f| plain(f.message))
+        hinted.map(|p| self.changed(p)).map_err(|f| PyValueError::new_err(f.message))
     }
 
     /// Sets the camera of views that have none: a dictionary as in camera files, or the path of

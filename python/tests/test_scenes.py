@@ -62,7 +62,7 @@ def test_hints_reach_the_program() -> None:
         data photo: image;
         let h = scene.hint(photo);
         assume seen = concat(h.box, h.axis.foot, h.axis.top, [h.axis.width], h.at[0], h.not[1]);
-        assume n = len(h.outline) + if h.drawn { 1 } else { 0 };
+        assume n = len(h.outline) + (if h.drawn { 1 } else { 0 });
         assume x ~ normal(0, 1);"""
     photo = np.zeros((40, 60, 3), np.uint8)
     mask = np.zeros((20, 30), bool)
@@ -77,8 +77,8 @@ def test_hints_reach_the_program() -> None:
         not_=[[50, 4], [51, 5]],
     )
     trace = hinted.compile().simulate()
-    np.testing.assert_array_equal(trace["seen"], [1, 2, 30, 20, 5, 30, 6, 3, 8, 3, 4, 51, 5])
-    assert trace["n"] == 4
+    np.testing.assert_array_equal(trace.value("seen"), [1, 2, 30, 20, 5, 30, 6, 3, 8, 3, 4, 51, 5])
+    assert trace.value("n") == 4
     with pytest.raises(ValueError, match="outside the photograph of 60 x 40"):
         program.hint(at=[[3, 41]])
     with pytest.raises(ValueError, match="proportions"):

@@ -132,6 +132,27 @@ fn what_cannot_be_there_is_refused() {
 }
 
 #[test]
+fn records_of_programs_are_checked() {
+    let f = folder();
+    let says = |call: &str, says: &str| {
+        let program = format!(
+            "include \"std/scene.pcad\" as scene; data photo: image;
+             let people = scene.people(photo, {call}); assume x ~ normal(len(people), 1);"
+        );
+        f.write("own.pcad", program);
+        let run = ["run", "own.pcad", "--observe", "disc.png", "--out", "out"];
+        f.refuses(&run, says);
+        f.run(&run).err
+    };
+    says("near = [1, 2, 3, 4]", "no argument `near` any more; use `hint = { box: [x, y, width");
+    let wrong =
+        says("hint = { bax: [1, 2, 3, 4] }", "scene.people: hint: a hint has no field `bax`");
+    assert!(wrong.contains("did you mean `box`?"), "{wrong}");
+    says("hint = { box: [90, 2, 3, 4] }", "outside the photograph of 60 x 40 pixels");
+    says("hint = { at: [1, 2] }", "`at` must be positions [[x, y], …]");
+}
+
+#[test]
 fn it_needs_one_photograph() {
     let f = folder();
     let no =

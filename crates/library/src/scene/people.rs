@@ -33,15 +33,15 @@ pub(super) const TABLE: &[Row] = &[native(
         HINT,
     ],
     Type::Array,
-    "The people in a photograph, the most prominent first, but first those on whom most positions \
-     `at` of the hint are and who fill its box (or else its mask or outline) best, and last those \
-     on whom its positions `not` are. Each is a record: `keypoints`, 33 \
-     joints, with alternative positions where views disagree; `landmarks`, by name `at`, `spread` \
-     over agreeing views and `visibility`; `metres`, by name [right, down, away] from the \
-     mid-hip; `mask`; `box`, [x, y, width, height] around all joints, and `torso`, in pixels; \
-     `score`; `sure`, the confidence from 0 to 1 that this is a person; `views`, the number of \
-     views in which the person was found, and `agreeing`, how many of them agree. Depends only on \
-     the picture, and is computed once.",
+    "The people in a photograph: first those at most positions `at` of the hint, then those who \
+     fill its box (or else its mask or outline) best, then the most prominent; last those at its \
+     positions `not`. Each is a record: `keypoints`, 33 joints, with alternative positions where \
+     views disagree; `landmarks`, by name `at`, `spread` over agreeing views and `visibility`; \
+     `metres`, by name [right, down, away] from the mid-hip; `mask`; `box`, [x, y, width, height] \
+     around all joints, and `torso`, in pixels; `score`; `sure`, the confidence from 0 to 1 that \
+     this is a person; `views`, the number of views in which the person was found, and \
+     `agreeing`, how many of them agree. Who is found depends only on the picture, and is \
+     computed once.",
     |a| {
         let image = a.object::<ImageValue>(0, "an image")?;
         let Some(photo) = image.as_photo() else { return Ok(Value::List(Arc::from([]))) };
