@@ -83,14 +83,14 @@ fn look(folder: &Path) -> Result<[Vec<[f64; NAMES.len()]>; 2], String> {
         Hint { bounds: Some([left, top, right - left, bottom - top]), ..Hint::default() }
     };
     let start = processor_seconds();
-    let exact = guesses(&photo, &hint([0.0; 4]));
+    let exact = guesses(&photo, &hint([0.0; 4]), &Method::ALL);
     let seconds = processor_seconds() - start;
     let exact = overlaps(&exact, &truth);
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     let [a, b, c, d, e, f] = exact;
     println!("{name:30} {a:.3} {b:.3} {c:.3}  {d:.3} {e:.3} {f:.3}  {seconds:.3}");
     let off = |n: u64| std::array::from_fn(|k| noise(4 * n + k as u64));
-    let loose = (0..BOXES).map(|n| overlaps(&guesses(&photo, &hint(off(n))), &truth));
+    let loose = (0..BOXES).map(|n| overlaps(&guesses(&photo, &hint(off(n)), &Method::ALL), &truth));
     Ok([vec![exact], loose.collect()])
 }
 
