@@ -55,7 +55,7 @@ pub struct Symmetric {
     corners: Vec<[f64; 2]>,
 }
 
-/// Edges about an axis direction.
+/// What is seen about a direction of axes.
 struct Turned {
     frame: Frame,
     strip: Strip,
