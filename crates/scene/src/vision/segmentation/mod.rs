@@ -29,7 +29,7 @@ const DRAWN: f64 = 128.0;
 /// kept, and no more than this many.
 const OVERLAP: f64 = 0.85;
 const OUTLINES: usize = 3;
-/// Half a right angle: axes farther from one that was pointed out are not it.
+/// Axes farther than this from one that was pointed out are not it, radians.
 const APART: f64 = std::f64::consts::FRAC_PI_4;
 
 /// How an outline was guessed.
