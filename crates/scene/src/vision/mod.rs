@@ -23,6 +23,8 @@ pub mod region;
 pub mod segmentation;
 
 #[cfg(test)]
+mod drawn;
+#[cfg(test)]
 mod testing;
 
 pub use crate::contours::{ContourChange, ContourSlice};

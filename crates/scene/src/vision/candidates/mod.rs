@@ -11,7 +11,7 @@
 
 pub(super) mod area;
 pub(super) mod clusters;
-mod components;
+pub(super) mod components;
 mod cut;
 mod enclosed;
 pub(super) mod features;

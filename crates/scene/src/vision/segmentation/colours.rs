@@ -22,6 +22,10 @@ const KEPT: f32 = 0.3;
 pub const LOOSE: f32 = 1.03;
 /// How far pixels around a click are meant by it, as a part of the object's longer side.
 const CLICK: f64 = 0.02;
+/// How much a click changes the log odds around it, and how far, as a part of the object's
+/// longer side.
+const CLICKED: f64 = 6.0;
+const AROUND: f64 = 0.1;
 
 /// What is known about the pixels of a window, in row-major order.
 pub struct Known {
@@ -45,10 +49,23 @@ impl Known {
             let [u, v] = frame.within(at);
             [(u / frame.half[0]).abs(), (v / frame.half[1]).abs()]
         };
+        let longer = 2.0 * frame.half[0].max(frame.half[1]);
+        let distance = |click: &[f64; 2], [x, y]: [f64; 2]| {
+            let click = window.within(*click);
+            libm::hypot(click[0] - x, click[1] - y)
+        };
+        let clicked = |at: [f64; 2]| {
+            let around = |clicks: &[[f64; 2]]| {
+                let near =
+                    |click| libm::exp(-0.5 * (distance(click, at) / (AROUND * longer)).powi(2));
+                clicks.iter().map(near).fold(0.0, f64::max)
+            };
+            CLICKED * (around(&hint.at) - around(&hint.not))
+        };
         let prior = |at: [f64; 2]| {
             let [u, v] = place(at);
             let out = libm::pow(libm::pow(u, POWER) + libm::pow(v, POWER), 1.0 / POWER);
-            (FALL * (1.0 - out)).clamp(BOUNDS[0], BOUNDS[1]) as f32
+            ((FALL * (1.0 - out)).clamp(BOUNDS[0], BOUNDS[1]) + clicked(at)) as f32
         };
         let out: Vec<f32> =
             window.centres().map(|at| place(at)[0].max(place(at)[1]) as f32).collect();
@@ -57,12 +74,9 @@ impl Known {
             (true, false) => BEYOND,
             (true, true) => 1.0,
         };
-        let reach = (2.0 * CLICK * frame.half[0].max(frame.half[1])).max(0.8);
+        let reach = (CLICK * longer).max(0.8);
         let near = |clicks: &[[f64; 2]], at: [f64; 2]| {
-            clicks.iter().any(|click| {
-                let [x, y] = window.within(*click);
-                libm::hypot(x - at[0], y - at[1]) <= reach
-            })
+            clicks.iter().any(|click| distance(click, at) <= reach)
         };
         let pointed = |at: [f64; 2]| match (near(&hint.at, at), near(&hint.not, at)) {
             (true, false) => 1.0,

@@ -8,6 +8,8 @@ use super::colours::Known;
 use super::max_flow::Grid;
 use super::window::Window;
 use crate::vision::candidates::area::{Area, largest};
+use crate::vision::candidates::components::components;
+use crate::vision::candidates::pixels::Pixels;
 
 /// Number of times that colours are learned.
 const ESTIMATES: usize = 3;
@@ -50,7 +52,21 @@ pub fn cut(window: &Window, known: &Known) -> Option<Area> {
             .collect();
         on = Some(Grid::new(width, &terminal, &similar).object());
     }
-    Some(largest(width, &on?)?.filled())
+    let whole = connected(width, &on?, &known.pointed)?;
+    let filled = whole.clone().filled();
+    let beside = |(i, j): (usize, usize)| known.pointed[j * width + i] < 0.0;
+    Some(if filled.points().any(beside) { whole } else { filled })
+}
+
+/// Returns the largest part of the object and those that were pointed out.
+fn connected(width: usize, on: &[bool], pointed: &[f32]) -> Option<Area> {
+    let mut area = largest(width, on)?;
+    let (of, sizes) = components(width, on);
+    let mut wanted = vec![false; sizes.len()];
+    of.iter().zip(pointed).for_each(|(number, sign)| wanted[*number as usize] |= *sign > 0.0);
+    let parts = Pixels::new(width, on.len() / width, |p| on[p] && wanted[of[p] as usize]);
+    area.pixels.add(&parts);
+    Area::of(area.pixels)
 }
 
 /// Returns for each pixel the one at its mirror image about the frame's axis, if that is in

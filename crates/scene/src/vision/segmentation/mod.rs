@@ -29,7 +29,7 @@ const DRAWN: f64 = 128.0;
 /// kept, and no more than this many.
 const OVERLAP: f64 = 0.85;
 const OUTLINES: usize = 3;
-/// Half a right angle: axes farther from one that was pointed out are not it.
+/// Axes farther than this from one that was pointed out are not it, radians.
 const APART: f64 = std::f64::consts::FRAC_PI_4;
 
 /// How an outline was guessed.
@@ -43,6 +43,11 @@ pub enum Method {
     Symmetric,
 }
 
+impl Method {
+    /// All methods.
+    pub const ALL: [Method; 3] = [Method::Ellipse, Method::Cut, Method::Symmetric];
+}
+
 /// A guess of an object's outline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Guess {
@@ -52,26 +57,32 @@ pub struct Guess {
     pub mask: Mask,
     /// Its axes, in pixels of the photograph; the likelier one first.
     pub axes: Vec<Axis>,
-    /// Its mean intersection over union with the first guesses of the other methods.
+    /// Its mean intersection over union with the first guesses of the other methods; 0
+    /// without any.
     pub score: f64,
 }
 
 /// Returns guesses of the outline of the object that a hint points out by a box or an axis:
-/// by each method in turn, the likelier ones first. None if neither is given, or if they are
-/// not in the photograph.
-pub fn guesses(photo: &Photo, hint: &Hint) -> Vec<Guess> {
+/// by some methods, in the order of [`Method`] and the likelier ones first. None if neither is
+/// given, or if they are not in the photograph.
+pub fn guesses(photo: &Photo, hint: &Hint, methods: &[Method]) -> Vec<Guess> {
     let Some(frame) = Frame::of(hint, photo.width(), photo.height()) else { return Vec::new() };
     let window = Window::new(photo, &frame, LONGER);
     let known = Known::new(&window, hint);
-    let found: Vec<Found> = ellipses(&window)
-        .into_iter()
-        .chain(graph_cut::cut(&window, &known).map(|area| cut_guess(&window, area)))
-        .chain(symmetric_guesses(&window, &known))
-        .collect();
+    let mut found = Vec::new();
+    if methods.contains(&Method::Ellipse) {
+        found.extend(ellipses(&window));
+    }
+    if methods.contains(&Method::Cut) {
+        found.extend(graph_cut::cut(&window, &known).map(|area| cut_guess(&window, area)));
+    }
+    if methods.contains(&Method::Symmetric) {
+        found.extend(symmetric_guesses(&window, &known));
+    }
     let first = |method: Method| found.iter().find(|f| f.method == method).map(|f| &f.area);
     let score = |found: &Found| {
-        let others = [Method::Ellipse, Method::Cut, Method::Symmetric].into_iter();
-        let others: Vec<f64> = others
+        let others: Vec<f64> = Method::ALL
+            .into_iter()
             .filter(|m| *m != found.method)
             .filter_map(first)
             .map(|area| area.iou(&found.area))

@@ -237,3 +237,104 @@ fn ways_on(last: &[f32], stride: usize, prices: &Prices, before: &mut [f32]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vision::testing::numbers;
+
+    const ROWS: usize = 6;
+    const COLUMNS: usize = 27;
+    const AXIS: usize = 13;
+    const PRICES: Prices = Prices { slope: 0.1, change: 0.3, most: 1.5 };
+
+    /// A strip of random gains, as sums and by cell.
+    fn strip(seed: u64) -> (Strip, Vec<f32>, Vec<f32>) {
+        let mut next = numbers(seed);
+        let mut list =
+            |n: usize, scale: f32| -> Vec<f32> { (0..n).map(|_| scale * (next() - 0.5)).collect() };
+        let (inside, ends) = (list(ROWS * COLUMNS, 0.5), list(ROWS * COLUMNS, 1.0));
+        let right = list(SLOPES * ROWS * COLUMNS, 6.0);
+        let left = list(SLOPES * ROWS * COLUMNS, 6.0);
+        let sums = |cells: &[f32]| -> Vec<f32> {
+            let row = |row: &[f32]| -> Vec<f32> {
+                (0..=COLUMNS).map(|n| row[..n].iter().sum()).collect()
+            };
+            cells.chunks(COLUMNS).flat_map(row).collect()
+        };
+        let (inside_sums, ends_sums) = (sums(&inside), sums(&ends));
+        let strip = Strip {
+            rows: ROWS,
+            columns: COLUMNS,
+            inside: inside_sums,
+            ends: ends_sums,
+            right,
+            left,
+        };
+        (strip, inside, ends)
+    }
+
+    /// What an outline gains, cell by cell.
+    fn gain(strip: &Strip, inside: &[f32], ends: &[f32], first: usize, widths: &[usize]) -> f32 {
+        let row = |cells: &[f32], t: usize, w: usize| -> f32 {
+            cells[t * COLUMNS + AXIS - w..=t * COLUMNS + AXIS + w].iter().sum()
+        };
+        let last = first + widths.len() - 1;
+        let mut sum = row(ends, first, widths[0]) + row(ends, last + 1, widths[widths.len() - 1]);
+        let mut before: Option<isize> = None;
+        for (i, w) in widths.iter().enumerate() {
+            sum += row(inside, first + i, *w);
+            if i == 0 {
+                continue;
+            }
+            let slope = *w as isize - widths[i - 1] as isize;
+            if slope.unsigned_abs() > STEEPEST {
+                return f32::NEG_INFINITY;
+            }
+            let middle = (w + widths[i - 1]) / 2;
+            let at = ((slope + STEEPEST as isize) as usize * ROWS + first + i) * COLUMNS;
+            sum += strip.right[at + AXIS + middle];
+            sum += strip.left[at + COLUMNS - 1 - (AXIS - middle)];
+            sum -= PRICES.slope * slope.unsigned_abs() as f32;
+            if let Some(before) = before {
+                sum -= (PRICES.change * slope.abs_diff(before) as f32).min(PRICES.most);
+            }
+            before = Some(slope);
+        }
+        sum
+    }
+
+    #[test]
+    fn no_outline_gains_more() {
+        const WIDEST: usize = 10;
+        let mut table = Table::default();
+        for seed in 0..30 {
+            let (strip, inside, ends) = strip(seed);
+            let found = strip.outline(AXIS, WIDEST, &PRICES, &mut table).unwrap();
+            let own = gain(&strip, &inside, &ends, found.first, &found.widths);
+            assert!((found.score - own).abs() < 1e-3, "{} is {own}", found.score);
+            let mut best = f32::NEG_INFINITY;
+            for first in 1..ROWS - 1 {
+                for rows in 1..ROWS - first {
+                    let mut widths = vec![LEAST; rows];
+                    loop {
+                        best = best.max(gain(&strip, &inside, &ends, first, &widths));
+                        let Some(i) = widths.iter().position(|w| *w < WIDEST) else { break };
+                        widths[i] += 1;
+                        widths[..i].fill(LEAST);
+                    }
+                }
+            }
+            assert!((found.score - best).abs() < 1e-3, "{} instead of {best}", found.score);
+        }
+    }
+
+    #[test]
+    fn without_room_there_is_no_outline() {
+        let (strip, _, _) = strip(1);
+        let mut table = Table::default();
+        for (axis, widest) in [(0, 10), (3, 10), (COLUMNS - 4, 10), (COLUMNS, 10), (AXIS, 1)] {
+            assert_eq!(strip.outline(axis, widest, &PRICES, &mut table), None, "{axis} {widest}");
+        }
+    }
+}

@@ -55,7 +55,7 @@ pub struct Symmetric {
     corners: Vec<[f64; 2]>,
 }
 
-/// Edges about an axis direction.
+/// What is seen about a direction of axes.
 struct Turned {
     frame: Frame,
     strip: Strip,
@@ -122,12 +122,12 @@ impl Symmetric {
         rows: usize,
     ) -> Symmetric {
         let middle = 0.5 * rows as f64;
-        let at = |across: f64, row: usize| {
-            [cell * (across + 0.5 - middle), cell * (row as f64 + 0.5 - middle)]
-        };
+        let at = |across: f64, row: f64| [cell * (across - middle), cell * (row - middle)];
+        // Half-widths are those at the centres of rows.
         let side = |sign: f64| {
             outline.widths.iter().enumerate().map(move |(i, w)| {
-                turned.outside(at(column as f64 + sign * *w as f64, outline.first + i))
+                let across = column as f64 + 0.5 + sign * *w as f64;
+                turned.outside(at(across, (outline.first + i) as f64 + 0.5))
             })
         };
         let corners: Vec<[f64; 2]> = side(1.0).chain(side(-1.0).rev()).collect();
