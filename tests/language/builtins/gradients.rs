@@ -18,6 +18,7 @@ const NONE: &[(&str, &str)] = &[
     ("scene.camera", "cameras are not differentiated"),
     ("scene.candidates", "regions are found in a photograph, which nothing moves"),
     ("scene.edges", "contours are found in a photograph, which nothing moves"),
+    ("scene.objects", "objects are found in a photograph, which nothing moves"),
     ("scene.people", "people are found in a photograph, which nothing moves"),
 ];
 

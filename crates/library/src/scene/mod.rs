@@ -13,6 +13,7 @@ mod compare_depths;
 mod compare_keypoints;
 pub mod data;
 mod examples;
+mod found_objects;
 mod inputs;
 mod objects;
 mod observed;
@@ -77,6 +78,7 @@ pub fn host() -> Host {
         region::TABLE,
         observed::TABLE,
         people::TABLE,
+        found_objects::TABLE,
         candidates::TABLE,
         compare_keypoints::TABLE,
         compare_depths::TABLE,

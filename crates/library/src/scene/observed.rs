@@ -79,7 +79,7 @@ pub struct ImageValue {
     ready: bool,
     /// The detector to use where the program does not choose one.
     by: OnceLock<DetectorValue>,
-    /// Contours by other detectors, candidate objects, people, and the reference data of
+    /// Contours by other detectors, candidate objects, objects of known classes, people, and the reference data of
     /// comparators.
     pub(super) prepared: Prepared,
 }
