@@ -73,7 +73,7 @@ fn objects_are_found_in_photographs() {
     let near = |a: [f64; 4], b: [f64; 4], by: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() < by);
     let skier = found(&example("skier.jpg"))[0];
     assert!(skier.name() == "person" && skier.score > 0.8, "{skier:?}");
-    // COCO's annotation of this picture (CC BY 4.0, COCO Consortium).
+    // From the hat to the boots, as read off the picture.
     assert!(near(skier.bounds, [67.0, 44.0, 286.0, 390.0], 10.0), "{skier:?}");
     let all = found(&example("coffee_cup.png"));
     let cup = all.iter().find(|o| o.name() == "cup").unwrap();
