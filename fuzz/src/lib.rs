@@ -9,7 +9,7 @@
 mod protocol;
 
 use pcadlang::{Model, Program, RunOptions};
-use pcadlang_detectors::nn::Network;
+use pcadlang_detectors::nn::{Network, NetworkError};
 use pcadlang_engine::lang::builtins::data::Options;
 use pcadlang_engine::trace::{Limits, SavedTrace, Trace};
 use pcadlang_inference::draws::{Column, DrawRow, Sink};
@@ -365,7 +365,11 @@ pub fn table(bytes: &[u8]) {
 
 /// Tests a network: one that was read can run, unless that takes too long.
 pub fn network(bytes: &[u8]) {
-    match Network::read(bytes) {
+    runs(Network::read(bytes));
+}
+
+fn runs(read: Result<Network, NetworkError>) {
+    match read {
         Ok(network) if network.work() < 1 << 20 => {
             let input = vec![0.5; network.input_shape().iter().product()];
             let outputs = network.run(input).map(|all| all.len());
@@ -374,6 +378,13 @@ pub fn network(bytes: &[u8]) {
         Ok(_) => {}
         Err(e) => assert!(!e.to_string().is_empty()),
     }
+}
+
+/// Tests a graph model: JSON, a zero byte, weights.
+pub fn graph_model(bytes: &[u8]) {
+    let at = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
+    let weights = bytes.get(at + 1..).unwrap_or_default();
+    runs(Network::read_graph_model(&bytes[..at], weights));
 }
 
 /// Tests a text frame of the studio: it is read or answered, and the answer is JSON.

@@ -266,6 +266,47 @@ fn people_in_photographs() {
     assert!(f.exists("skier.png"));
 }
 
+/// Objects are detected, listed, written as COCO's annotations, and drawn as boxes.
+#[test]
+fn objects_in_photographs() {
+    let f = Folder::new("detect_objects");
+    let skier = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/images/skier.jpg");
+    std::fs::copy(skier, f.path().join("skier.jpg")).unwrap();
+    f.write("grey.png", png(image::GrayImage::from_pixel(90, 60, image::Luma([128]))));
+    let mut text = f.session(&["detect", "--objects", "skier.jpg", "--overlay", "boxes.png"]);
+    text += &f.session(&["detect", "--objects", "grey.png", "-o", "nothing.json"]);
+    text += &f.session(&["detect", "--objects", "skier.jpg", "--views", "4"]);
+    assert_session("detect_objects", &text);
+    let read = |file: &str| -> serde_json::Value { serde_json::from_str(&f.read(file)).unwrap() };
+    let coco = read("objects.json");
+    assert_eq!(coco["images"][0]["file_name"], "skier.jpg");
+    assert_eq!(
+        (&coco["images"][0]["width"], &coco["images"][0]["height"]),
+        (&344.into(), &425.into())
+    );
+    let categories = coco["categories"].as_array().unwrap();
+    let named = |i: u64| categories.iter().find(|c| c["id"] == i).map(|c| c["name"].clone());
+    assert_eq!(
+        (named(1), named(35), named(90)),
+        (Some("person".into()), Some("skis".into()), Some("toothbrush".into()))
+    );
+    assert_eq!((categories.len(), named(12)), (80, None));
+    let person = &coco["annotations"][0];
+    assert_eq!((&person["category_id"], &person["image_id"]), (&1.into(), &1.into()));
+    let place: Vec<f64> =
+        person["bbox"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+    for (got, expected) in place.iter().zip([66.0, 44.0, 219.0, 342.0]) {
+        assert!((got - expected).abs() < 10.0, "{place:?}");
+    }
+    assert!(read("nothing.json")["annotations"].as_array().unwrap().is_empty());
+    // The left side of the best box is red.
+    let boxes = image::open(f.path().join("boxes.png")).unwrap().to_rgb8();
+    let scale = f64::from(boxes.width()) / 344.0;
+    let [x, y] = [place[0], place[1] + 0.5 * place[3]].map(|p| (p * scale) as u32);
+    let image::Rgb([red, green, blue]) = *boxes.get_pixel(x, y);
+    assert!(red > 180 && green < 120 && blue < 120, "{red} {green} {blue}");
+}
+
 /// Ctrl-C ends a run; all draws so far are kept and summarised.
 #[cfg(unix)]
 #[test]

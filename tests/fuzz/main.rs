@@ -4,6 +4,9 @@
 #[path = "../common/mod.rs"]
 mod common;
 #[allow(dead_code)]
+#[path = "../../crates/detectors/src/nn/tests/graph.rs"]
+mod graphs;
+#[allow(dead_code)]
 #[path = "../../crates/detectors/src/nn/tests/writer.rs"]
 mod networks;
 #[path = "../../fuzz/src/lib.rs"]
@@ -49,7 +52,7 @@ macro_rules! targets {
     };
 }
 
-targets! { program_text program obj gltf rig image array camera trace bank checkpoint keypoints table network studio }
+targets! { program_text program obj gltf rig image array camera trace bank checkpoint keypoints table network graph_model studio }
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -241,6 +244,10 @@ fn seeds_of(target: &str) -> Vec<Vec<u8>> {
             "\u{1}x;ok\n1;true\n",
         ]),
         "network" => vec![networks::file(b"TFL3", &networks::small())],
+        "graph_model" => {
+            let files = [graphs::small(), graphs::split()].map(|g| g.files());
+            files.map(|(json, weights)| [json, vec![0], weights].concat()).to_vec()
+        }
         _ => Vec::new(),
     }
 }
@@ -296,6 +303,10 @@ fn accepts_its_seeds(name: &str, target: Target) {
             "camera" => Camera::from_json(text()).is_ok(),
             "keypoints" => People::parse(seed).is_ok(),
             "network" => pcadlang_detectors::nn::Network::read(seed).is_ok(),
+            "graph_model" => {
+                let (json, weights) = seed.split_at(seed.iter().position(|b| *b == 0).unwrap());
+                pcadlang_detectors::nn::Network::read_graph_model(json, &weights[1..]).is_ok()
+            }
             "checkpoint" => pcadlang_inference::Checkpoint::from_bytes(seed).is_ok(),
             _ => true,
         };

@@ -120,9 +120,7 @@ fn bounds(m: &Mask) -> [f64; 4] {
 /// with the object on the right.
 fn outline(m: &Mask) -> Vec<[f64; 2]> {
     let (w, h) = (m.width() as i64, m.height() as i64);
-    let on = |x: i64, y: i64| {
-        x >= 0 && y >= 0 && x < w && y < h && m.data()[(y * w + x) as usize]
-    };
+    let on = |x: i64, y: i64| x >= 0 && y >= 0 && x < w && y < h && m.data()[(y * w + x) as usize];
     let Some(first) = m.data().iter().position(|on| *on) else { return Vec::new() };
     let start = [first as i64 % w, first as i64 / w];
     let (mut at, mut step, mut corners) = (start, [1, 0], Vec::new());
@@ -253,7 +251,8 @@ fn main() -> Result<(), String> {
         for case in &cases {
             let runs = s.seeds.iter().map(|seed| run(&s, kind, case, *seed));
             let runs = runs.collect::<Result<Vec<_>, String>>()?;
-            let signs: String = runs.iter().map(|(_, t)| if *t > 0.0 { '+' } else { '-' }).collect();
+            let signs: String =
+                runs.iter().map(|(_, t)| if *t > 0.0 { '+' } else { '-' }).collect();
             let mut overlaps: Vec<f64> = runs.iter().map(|(overlap, _)| *overlap).collect();
             let shown: Vec<String> = overlaps.iter().map(|v| format!("{v:.2}")).collect();
             let middle = median(&mut overlaps);

@@ -2,12 +2,13 @@
 
 use clap::Args;
 use image::RgbImage;
+use pcadlang_detectors::objects::{self, FoundObject, ObjectOptions};
 use pcadlang_detectors::people::{FindOptions, Person, json};
 use pcadlang_report::pictures::{DETECTED, dots, limbs, picture_size, png};
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::{files, inputs};
 use pcadlang_scene::vision::Photo;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// `detect`.
 #[derive(Args, Debug)]
@@ -15,13 +16,16 @@ pub struct Detect {
     /// The photograph
     #[arg(value_name = "IMG")]
     pub image: PathBuf,
-    /// The file to write the people to, readable by `--keypoints`
-    #[arg(short, long, value_name = "FILE", default_value = "people.json")]
-    pub out: PathBuf,
-    /// Its layout
+    /// Detect objects of COCO's 80 classes instead of people, and write boxes as COCO annotations
+    #[arg(long, conflicts_with_all = ["format", "models", "views", "people", "threads"])]
+    pub objects: bool,
+    /// The file to write to [default: people.json, readable by `--keypoints`, or objects.json]
+    #[arg(short, long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// The layout of people
     #[arg(long, value_enum, default_value_t = PeopleFormat::Coco)]
     pub format: PeopleFormat,
-    /// Draw the people over the photograph, to this file
+    /// Draw what was detected over the photograph, to this file
     #[arg(long, value_name = "PNG")]
     pub overlay: Option<PathBuf>,
     /// A folder with networks: pose_detection.tflite, pose_landmark_heavy.tflite, …_full
@@ -47,6 +51,16 @@ pub enum PeopleFormat {
     /// MediaPipe's 33 landmarks, as fractions of the picture's sides
     Mediapipe,
 }
+
+/// The colours of boxes, in the order of objects.
+const COLORS: [(&str, [f32; 3]); 6] = [
+    ("red", [230.0, 60.0, 50.0]),
+    ("green", [60.0, 200.0, 90.0]),
+    ("blue", [70.0, 130.0, 255.0]),
+    ("yellow", [250.0, 210.0, 50.0]),
+    ("magenta", [230.0, 80.0, 220.0]),
+    ("cyan", [70.0, 220.0, 230.0]),
+];
 
 /// The landmarks at the two ends of a bone.
 type Bone = (&'static str, &'static str);
@@ -80,26 +94,68 @@ const BONES: [(&[Bone], [f32; 3]); 3] = [
     (&[("l_shoulder", "r_shoulder"), ("l_hip", "r_hip")], [240.0, 240.0, 240.0]),
 ];
 
-/// Detects the people in a photograph and writes their positions.
+/// Detects the people or objects in a photograph and writes their positions.
 pub fn detect(a: &Detect) -> Result<(), Failure> {
     let photo = inputs::photo(&a.image)?;
+    if a.objects { detect_objects(a, &photo) } else { detect_people(a, &photo) }
+}
+
+fn detect_people(a: &Detect, photo: &Photo) -> Result<(), Failure> {
     let options = FindOptions { views: a.views, most: a.people as usize, ..FindOptions::default() };
     let people = inputs::finder(a.models.as_deref())?
-        .find(&photo, &options, a.threads)
+        .find(photo, &options, a.threads)
         .map_err(|e| plain(e.to_string()))?;
     let size = (photo.width(), photo.height());
-    let name = a.image.file_name().unwrap_or_default().to_string_lossy();
     let file = match a.format {
-        PeopleFormat::Coco => json::coco(&people, size, &name),
+        PeopleFormat::Coco => json::coco(&people, size, &name(a)),
         PeopleFormat::Mediapipe => json::mediapipe(&people, size),
     };
-    files::write(&a.out, format!("{file:#}\n").as_bytes())?;
-    if let Some(path) = &a.overlay {
-        files::write(path, &png(&overlay(&photo, &people)).map_err(|e| plain(e.to_string()))?)?;
-    }
+    write(a, "people.json", &format!("{file:#}\n"), || overlay(photo, &people))?;
     print_line!("{}", found(&people));
     for (i, p) in people.iter().enumerate() {
         print_line!("{}", line(i + 1, p, size));
+    }
+    Ok(())
+}
+
+/// Detects the objects in a photograph, and lists them with the colours of their boxes.
+fn detect_objects(a: &Detect, photo: &Photo) -> Result<(), Failure> {
+    let finder = objects::networks::finder().map_err(plain)?;
+    let found = finder.find(photo, &ObjectOptions::default()).map_err(|e| plain(e.to_string()))?;
+    let file = objects::json::coco(&found, (photo.width(), photo.height()), &name(a));
+    write(a, "objects.json", &format!("{file:#}\n"), || boxes(photo, &found))?;
+    match found.len() {
+        0 => print_line!("no objects were found"),
+        1 => print_line!("1 object"),
+        n => print_line!("{n} objects, the highest score first"),
+    }
+    for (i, (o, (color, _))) in found.iter().zip(COLORS.iter().cycle()).enumerate() {
+        let [left, top, right, bottom] = o.bounds.map(|x| x.round());
+        print_line!(
+            "{}: {}, {:.0}%: x {left} to {right}, y {top} to {bottom} ({color})",
+            i + 1,
+            o.name(),
+            100.0 * o.score
+        );
+    }
+    Ok(())
+}
+
+/// The photograph's name without its folder.
+fn name(a: &Detect) -> String {
+    a.image.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Writes what was detected, and the overlay if one is wanted.
+fn write(
+    a: &Detect,
+    usual: &str,
+    text: &str,
+    overlay: impl FnOnce() -> RgbImage,
+) -> Result<(), Failure> {
+    files::write(a.out.as_deref().unwrap_or(Path::new(usual)), text.as_bytes())?;
+    if let Some(path) = &a.overlay {
+        files::write(path, &png(&overlay()).map_err(|e| plain(e.to_string()))?)?;
     }
     Ok(())
 }
@@ -133,12 +189,29 @@ fn line(number: usize, p: &Person, (width, height): (u32, u32)) -> String {
     )
 }
 
+/// The photograph at the size of pictures.
+fn base(photo: &Photo) -> RgbImage {
+    let (width, height) = picture_size(photo.width(), photo.height());
+    image::imageops::resize(photo.rgb(), width, height, image::imageops::FilterType::Triangle)
+}
+
+/// Draws the boxes of objects over the photograph, the best on top.
+fn boxes(photo: &Photo, objects: &[FoundObject]) -> RgbImage {
+    let size = (photo.width(), photo.height());
+    let mut out = base(photo);
+    let colored: Vec<_> = objects.iter().zip(COLORS.iter().cycle()).collect();
+    for (o, (_, color)) in colored.into_iter().rev() {
+        let [l, t, r, b] = o.bounds;
+        let sides = [[[l, t], [r, t]], [[r, t], [r, b]], [[r, b], [l, b]], [[l, b], [l, t]]];
+        limbs(&mut out, size, &sides, *color);
+    }
+    out
+}
+
 /// Draws people over the photograph: the left side green, the right side red.
 fn overlay(photo: &Photo, people: &[Person]) -> RgbImage {
     let size = (photo.width(), photo.height());
-    let (width, height) = picture_size(size.0, size.1);
-    let mut out =
-        image::imageops::resize(photo.rgb(), width, height, image::imageops::FilterType::Triangle);
+    let mut out = base(photo);
     for p in people {
         for (bones, color) in BONES {
             let ends: Vec<_> = bones

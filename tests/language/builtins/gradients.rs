@@ -19,6 +19,7 @@ const NONE: &[(&str, &str)] = &[
     ("scene.candidates", "regions are found in a photograph, which nothing moves"),
     ("scene.edges", "contours are found in a photograph, which nothing moves"),
     ("scene.hint", "what a user points out, which nothing moves"),
+    ("scene.objects", "objects are found in a photograph, which nothing moves"),
     ("scene.people", "people are found in a photograph, which nothing moves"),
 ];
 

@@ -3,6 +3,7 @@
 mod gradients;
 mod lists;
 mod maths;
+mod objects;
 mod operators;
 mod search;
 mod table;

@@ -54,7 +54,7 @@ impl Convolution {
         Convolution { window, channels, depth, panels, biases: padded, slope: 1.0, clip }
     }
 
-    /// Returns the number of elements stored for so many weights and output channels.
+    /// Returns the number of elements stored for these numbers of weights and output channels.
     pub fn stored(weights: usize, channels: usize) -> usize {
         (weights / channels.max(1)).saturating_mul(channels.next_multiple_of(PANEL))
     }

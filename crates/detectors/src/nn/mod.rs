@@ -19,7 +19,7 @@ mod schema;
 mod shape;
 mod sparse;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use network::Network;
 pub use operator::sigmoid;

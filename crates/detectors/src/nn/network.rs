@@ -41,7 +41,7 @@ pub(super) struct Effort {
 }
 
 impl Effort {
-    /// Adds an operator with inputs of these shapes and so many outputs.
+    /// Adds an operator with inputs of these shapes and an output of this size.
     pub fn add(
         &mut self,
         operator: &Operator,

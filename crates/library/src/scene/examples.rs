@@ -123,6 +123,13 @@ let people = scene.people(photo);
 assume tall ~ normal(if len(people) > 0 { people[0].torso } else { 0 }, 1);",
     ),
     (
+        "scene.objects",
+        "\
+data photo = image(\"ball.png\");
+let cups = scene.objects(photo, classes = [\"cup\", \"bowl\", \"vase\"], least = 0.2);
+assume wide ~ normal(if len(cups) > 0 { cups[0].box[2] } else { 0 }, 1);",
+    ),
+    (
         "scene.candidates",
         "\
 data photo = image(\"ball.png\");

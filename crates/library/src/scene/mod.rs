@@ -13,6 +13,7 @@ mod compare_depths;
 mod compare_keypoints;
 pub mod data;
 mod examples;
+mod found_objects;
 pub mod hint;
 mod inputs;
 mod objects;
@@ -80,6 +81,7 @@ pub fn host() -> Host {
         observed::TABLE,
         people::TABLE,
         hint::TABLE,
+        found_objects::TABLE,
         candidates::TABLE,
         compare_keypoints::TABLE,
         compare_depths::TABLE,

@@ -4,7 +4,7 @@
 //! cached with it.
 
 use super::places::{self, Place};
-use super::{IMAGE, native, people};
+use super::{IMAGE, found_objects, native, people};
 use pcadlang_detectors::people::Person;
 use pcadlang_engine::lang::builtins::{Domain, Row, Type, arg, int, num, opt};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
@@ -149,9 +149,13 @@ impl ImageValue {
     ///
     /// # Errors
     /// If a detector fails.
-    pub fn places(&self, options: &CandidateOptions, hint: &Hint) -> Result<Arc<Vec<Place>>, Fault> {
+    pub fn places(
+        &self,
+        options: &CandidateOptions,
+        hint: &Hint,
+    ) -> Result<Arc<Vec<Place>>, Fault> {
         self.prepared().get((*options, hint.clone()), |(options, hint)| match self.as_photo() {
-            Some(photo) => places::places(photo, hint, options),
+            Some(photo) => Ok(places::places(photo, &*found_objects::found(self)?, hint, options)),
             None => Ok(places::regions(&enclosed(self.map()?, options), 1.0)),
         })
     }

@@ -1,10 +1,9 @@
 //! Places in a photograph where an object of revolution may be: where the user points, in
 //! the boxes of a detector, or in regions that are nearly mirror-symmetric.
 
-use pcadlang_detectors::objects::{FoundObject, ObjectOptions, networks};
-use pcadlang_engine::lang::error::{Fault, FaultKind};
+use pcadlang_detectors::objects::FoundObject;
 use pcadlang_scene::vision::candidates::{Axis, Candidate, CandidateOptions, candidates};
-use pcadlang_scene::vision::segmentation::{Guess, Method, guesses, from_mask};
+use pcadlang_scene::vision::segmentation::{Guess, Method, from_mask, guesses};
 use pcadlang_scene::vision::{Hint, Mask, Photo};
 
 /// The classes of COCO that are objects of revolution.
@@ -45,14 +44,13 @@ impl Place {
             let axes = all.iter().filter(move |g| g.method == method).flat_map(|g| &g.axes);
             axes.enumerate().map(|(i, axis)| (axis.clone(), 0.5f64.powi(i as i32)))
         };
-        let methods = [Method::Symmetric, Method::Cut, Method::Ellipse];
-        let axes = methods.into_iter().flat_map(weighted).collect();
+        let axes = Method::ALL.into_iter().flat_map(weighted).collect();
         Place { score, source: source.into(), bounds, masks, axes: normalised(axes) }
     }
 
     fn region(c: &Candidate, score: f64) -> Place {
         let axes = c.axes.iter().cloned().zip([0.8, 0.2]).collect();
-        Place { axes: normalised(axes), ..Place::anywhere(score) }
+        Place { masks: vec![c.mask.clone()], axes: normalised(axes), ..Place::anywhere(score) }
     }
 
     /// A place that nothing points to.
@@ -69,25 +67,27 @@ fn normalised(mut axes: Vec<(Axis, f64)>) -> Vec<(Axis, f64)> {
 }
 
 /// Returns the places of a photograph that a hint leaves open, the most probable first.
-///
-/// # Errors
-/// Those of the detector.
-pub fn places(photo: &Photo, hint: &Hint, options: &CandidateOptions) -> Result<Vec<Place>, Fault> {
+pub(super) fn places(
+    photo: &Photo,
+    objects: &[FoundObject],
+    hint: &Hint,
+    options: &CandidateOptions,
+) -> Vec<Place> {
     if let Some(mask) = hint.drawn(photo.width(), photo.height()) {
         let axes = from_mask(photo, &mask).into_iter().zip([0.8, 0.2]).collect();
         let (source, bounds) = ("drawn".into(), None);
         let masks = vec![mask];
-        return Ok(vec![Place { score: 1.0, source, bounds, masks, axes: normalised(axes) }]);
+        return vec![Place { score: 1.0, source, bounds, masks, axes: normalised(axes) }];
     }
     if hint.axis.is_some() || hint.bounds.is_some() {
         let source = if hint.axis.is_some() { "axis" } else { "box" };
-        return Ok(vec![Place::guessed(source, 1.0, hint.bounds, &guesses(photo, hint))]);
+        return vec![Place::guessed(source, 1.0, hint.bounds, &guesses(photo, hint, &Method::ALL))];
     }
-    let boxes = boxes(photo, hint)?;
+    let boxes = boxes(photo, objects, hint);
     let seen = boxes.iter().map(|(o, weight)| {
         let [l, t, r, b] = o.bounds;
         let bounds = Some([l, t, r - l, b - t]);
-        let all = guesses(photo, &Hint { bounds, ..hint.clone() });
+        let all = guesses(photo, &Hint { bounds, ..hint.clone() }, &Method::ALL);
         Place::guessed(o.name(), *weight, bounds, &all)
     });
     let mut all: Vec<Place> = seen.collect();
@@ -103,23 +103,20 @@ pub fn places(photo: &Photo, hint: &Hint, options: &CandidateOptions) -> Result<
     if share > 0.0 {
         all.extend(regions(&meant(candidates(photo, options), photo, hint), share));
     }
-    Ok(all)
+    all
 }
 
 /// Returns the detector's boxes that may be meant, with their weights, the best first.
-fn boxes(photo: &Photo, hint: &Hint) -> Result<Vec<(FoundObject, f64)>, Fault> {
-    let fault = |why: String| Fault::new(FaultKind::Other, why);
+fn boxes(photo: &Photo, objects: &[FoundObject], hint: &Hint) -> Vec<(FoundObject, f64)> {
     let clicked = !hint.at.is_empty();
     let least = if clicked { LEAST_CLICKED } else { LEAST };
-    let options = ObjectOptions { least, ..ObjectOptions::default() };
-    let finder = networks::finder().map_err(|why| fault(why.into()))?;
-    let found = finder.find(photo, &options).map_err(|e| fault(e.to_string()))?;
     let inside = |o: &FoundObject, [x, y]: [f64; 2]| {
         let [l, t, r, b] = o.bounds;
         (l..=r).contains(&x) && (t..=b).contains(&y)
     };
     let meant = |o: &FoundObject| {
-        (clicked || ROUND.contains(&o.name()))
+        o.score >= least
+            && (clicked || ROUND.contains(&o.name()))
             && hint.at.iter().all(|p| inside(o, *p))
             && !hint.not.iter().any(|p| inside(o, *p))
     };
@@ -137,10 +134,10 @@ fn boxes(photo: &Photo, hint: &Hint) -> Result<Vec<(FoundObject, f64)>, Fault> {
         o.score * central * area.sqrt().sqrt() * cut_off
     };
     let mut all: Vec<(FoundObject, f64)> =
-        found.into_iter().filter(meant).map(|o| (o, weight(&o))).collect();
+        objects.iter().filter(|o| meant(o)).map(|o| (*o, weight(o))).collect();
     all.sort_by(|a, b| b.1.total_cmp(&a.1));
     all.truncate(BOXES);
-    Ok(all)
+    all
 }
 
 /// Returns regions as places, the weights of which add up to `share`.
@@ -160,9 +157,8 @@ fn meant(mut all: Vec<Candidate>, photo: &Photo, hint: &Hint) -> Vec<Candidate> 
         let row = (y / f64::from(photo.height()) * f64::from(h)) as u32;
         c.mask.data()[(row.min(h - 1) * w + column.min(w - 1)) as usize]
     };
-    let fits = |c: &Candidate| {
-        hint.at.iter().all(|p| has(c, *p)) && !hint.not.iter().any(|p| has(c, *p))
-    };
+    let fits =
+        |c: &Candidate| hint.at.iter().all(|p| has(c, *p)) && !hint.not.iter().any(|p| has(c, *p));
     if all.iter().any(fits) {
         all.retain(fits);
     }

@@ -1,6 +1,8 @@
 //! Tests of operators against their definitions, of small generated files, and of broken
 //! files.
 
+pub mod graph;
+mod graph_model;
 mod operators;
 mod writer;
 
