@@ -11,28 +11,28 @@ use std::path::PathBuf;
 
 /// Where the object is in the photograph.
 #[derive(Args, Clone, Debug, Default, PartialEq)]
-#[command(next_help_heading = "Where the object is, in pixels of the photograph")]
 pub struct HintArgs {
-    /// The object's pixels: a PNG or JPEG with bright pixels on it, or a .npy array, of the
-    /// photograph's proportions
+    /// The object's pixels in the photograph: a PNG or JPEG with bright pixels on it, or a
+    /// .npy array, of the photograph's proportions
     #[arg(long, value_name = "FILE")]
     pub mask: Option<PathBuf>,
-    /// The corners of an outline around it, at least three
+    /// The corners of an outline around the object, at least three, in pixels of the
+    /// photograph
     #[arg(long, value_name = "X,Y", num_args = 1.., value_parser = corners)]
     pub outline: Vec<Corners>,
-    /// A box around it
+    /// A box around the object, in pixels of the photograph
     #[arg(long = "box", value_name = "X,Y,W,H", allow_hyphen_values = true, value_parser = rectangle)]
     pub bounds: Option<[f64; 4]>,
-    /// Its axis: the end on which it stands, the other end, and its width across
+    /// The object's axis: the end on which it stands, the other end, and its width across
     #[arg(
         long, num_args = 3, value_names = ["X,Y", "X,Y", "W"], allow_hyphen_values = true,
         value_parser = numbers
     )]
     pub axis: Vec<Numbers>,
-    /// A position on it; may be repeated
+    /// A position on the object; may be repeated
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = position)]
     pub at: Vec<[f64; 2]>,
-    /// A position beside it; may be repeated
+    /// A position beside the object; may be repeated
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true, value_parser = position)]
     pub not: Vec<[f64; 2]>,
 }

@@ -75,10 +75,10 @@ fn value(hint: &Hint, (width, height): (u32, u32)) -> Value {
 /// Returns the argument [`HINT`] of a call, or else the hint of the photograph.
 ///
 /// # Errors
-/// As [`from_value`], with the name of the argument.
+/// As [`from_value`].
 pub(super) fn asked<'a>(a: &Args<'a>, image: &'a ImageValue) -> Result<Cow<'a, Hint>, Fault> {
     match a.is_written("hint") {
-        true => from_value(a.get("hint"), image.size()).map(Cow::Owned).map_err(|f| f.of("hint")),
+        true => from_value(a.get("hint"), image.size()).map(Cow::Owned),
         false => Ok(Cow::Borrowed(image.hint())),
     }
 }
