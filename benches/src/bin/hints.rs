@@ -16,7 +16,9 @@
 //! over the seeds, and whether the top is towards (+) or away from the camera (-) in each;
 //! then the mean and the median of the cases and how many reach 0.8.
 
+use pcadlang_library::scene::ImageValue;
 use pcadlang_numerics::rng::{Purpose, Stream, StreamKey};
+use pcadlang_scene::vision::candidates::CandidateOptions;
 use pcadlang_scene::vision::segmentation::from_mask;
 use pcadlang_scene::vision::{Limits, Mask, distance_transform, mask, photo};
 use std::path::{Path, PathBuf};
@@ -222,10 +224,7 @@ fn run(s: &Settings, kind: &str, case: &Case, seed: u64) -> Result<(f64, f64), S
         return Err(format!("{}: {}", case.name, String::from_utf8_lossy(&ran.stderr)));
     }
     let fit = read_mask(&out.join("mask.png"))?.resized(case.mask.width(), case.mask.height());
-    let pairs = || fit.data().iter().zip(case.mask.data());
-    let both = pairs().filter(|(a, b)| **a && **b).count();
-    let either = pairs().filter(|(a, b)| **a || **b).count().max(1);
-    Ok((both as f64 / either as f64, toward(&out).unwrap_or(0.0)))
+    Ok((overlap(&fit, &case.mask), toward(&out).unwrap_or(0.0)))
 }
 
 /// The axis of the best state towards the camera.
@@ -243,9 +242,37 @@ fn median(values: &mut [f64]) -> f64 {
     if n == 0 { f64::NAN } else { 0.5 * (values[(n - 1) / 2] + values[n / 2]) }
 }
 
+/// Prints the places of a case, with the overlap of each outline and the truth.
+fn show_places(case: &Case) -> Result<(), String> {
+    let bytes = std::fs::read(&case.image).map_err(|e| e.to_string())?;
+    let photo = photo::decode(&bytes, &Limits::default()).map_err(|e| e.to_string())?;
+    let image = ImageValue::photo(photo);
+    let places = image.places(&CandidateOptions::default(), image.hint());
+    println!("{}: box {:.0?}", case.name, bounds(&case.mask));
+    for p in places.map_err(|e| e.message)?.iter().take(6) {
+        let truth = |m: &Mask| overlap(m, &case.mask.resized(m.width(), m.height()));
+        let overlaps: Vec<f64> = p.masks.iter().map(truth).collect();
+        let apart = match &p.masks[..] {
+            [a, b] => overlap(a, b),
+            _ => 1.0,
+        };
+        println!("  {:12} {:.3} {overlaps:.2?} {apart:.2} {:.0?}", p.source, p.score, p.bounds);
+    }
+    Ok(())
+}
+
+fn overlap(a: &Mask, b: &Mask) -> f64 {
+    let pairs = || a.data().iter().zip(b.data());
+    let both = pairs().filter(|(a, b)| **a && **b).count();
+    both as f64 / pairs().filter(|(a, b)| **a || **b).count().max(1) as f64
+}
+
 fn main() -> Result<(), String> {
     let s = settings()?;
     let cases = cases(&s)?;
+    if s.kinds == ["places"] {
+        return cases.iter().try_for_each(show_places);
+    }
     for kind in &s.kinds {
         let mut medians = Vec::new();
         for case in &cases {

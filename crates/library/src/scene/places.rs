@@ -1,6 +1,7 @@
 //! Places in a photograph where an object of revolution may be: where the user points, in
 //! the boxes of a detector, or in regions that are nearly mirror-symmetric.
 
+use pcadlang_detectors::boxes::overlap;
 use pcadlang_detectors::objects::FoundObject;
 use pcadlang_scene::vision::candidates::{Axis, Candidate, CandidateOptions, candidates};
 use pcadlang_scene::vision::segmentation::{Guess, Method, from_mask, guesses};
@@ -10,11 +11,12 @@ use pcadlang_scene::vision::{Hint, Mask, Photo};
 const ROUND: [&str; 7] = ["bottle", "wine glass", "cup", "bowl", "apple", "orange", "vase"];
 /// The maximum number of boxes of the detector.
 const BOXES: usize = 3;
-/// The minimum score of a box, and of one that a click points out.
-const LEAST: f64 = 0.2;
-const LEAST_CLICKED: f64 = 0.05;
-/// The weight of all regions together, beside boxes.
-const REGIONS: f64 = 0.25;
+/// The minimum score of an object.
+const LEAST: f64 = 0.08;
+/// Boxes that overlap more than this (intersection over union) are of one object.
+const SAME: f64 = 0.75;
+/// The weight of all regions together; that of a box that is seen clearly is about 0.5.
+const REGIONS: f64 = 0.1;
 /// Each side of the picture that a box touches multiplies its weight by this.
 const CUT_OFF: f64 = 0.6;
 
@@ -88,40 +90,44 @@ pub(super) fn places(
         let [l, t, r, b] = o.bounds;
         let bounds = Some([l, t, r - l, b - t]);
         let all = guesses(photo, &Hint { bounds, ..hint.clone() }, &Method::ALL);
-        Place::guessed(o.name(), *weight, bounds, &all)
+        Place::guessed(o.class, *weight, bounds, &all)
     });
     let mut all: Vec<Place> = seen.collect();
-    let weight = |places: &[Place]| places.iter().map(|p| p.score).sum::<f64>();
-    let seen = weight(&all);
-    // A click on a box that is seen leaves no doubt.
-    let share = match (all.is_empty(), hint.at.is_empty()) {
-        (true, _) => 1.0,
-        (false, true) => REGIONS,
-        (false, false) => 0.0,
-    };
-    all.iter_mut().for_each(|p| p.score *= (1.0 - share) / seen);
+    // A click in a box leaves no doubt that the box is meant.
+    let clicked = !hint.at.is_empty() && !all.is_empty();
+    let unseen = if clicked { 0.0 } else { REGIONS };
+    let seen = all.iter().map(|p| p.score).sum::<f64>();
+    let share = unseen / (unseen + seen);
+    all.iter_mut().for_each(|p| p.score /= unseen + seen);
     if share > 0.0 {
         all.extend(regions(&meant(candidates(photo, options), photo, hint), share));
     }
     all
 }
 
-/// Returns the detector's boxes that may be meant, with their weights, the best first.
-fn boxes(photo: &Photo, objects: &[FoundObject], hint: &Hint) -> Vec<(FoundObject, f64)> {
+/// A box where the detector sees a vessel or a fruit, of whatever class: the mean of boxes
+/// that overlap, weighted by the squares of their scores.
+struct Seen {
+    /// The class with the highest score.
+    class: &'static str,
+    bounds: [f64; 4],
+    /// The sum of the scores, and of their squares.
+    score: f64,
+    sure: f64,
+}
+
+/// Returns the boxes that may be meant, with their weights, the best first.
+fn boxes(photo: &Photo, objects: &[FoundObject], hint: &Hint) -> Vec<(Seen, f64)> {
     let clicked = !hint.at.is_empty();
-    let least = if clicked { LEAST_CLICKED } else { LEAST };
-    let inside = |o: &FoundObject, [x, y]: [f64; 2]| {
-        let [l, t, r, b] = o.bounds;
-        (l..=r).contains(&x) && (t..=b).contains(&y)
-    };
-    let meant = |o: &FoundObject| {
-        o.score >= least
-            && (clicked || ROUND.contains(&o.name()))
-            && hint.at.iter().all(|p| inside(o, *p))
-            && !hint.not.iter().any(|p| inside(o, *p))
+    let round = |o: &&FoundObject| o.score >= LEAST && (clicked || ROUND.contains(&o.name()));
+    let inside =
+        |[l, t, r, b]: [f64; 4], [x, y]: [f64; 2]| (l..=r).contains(&x) && (t..=b).contains(&y);
+    let meant = |o: &Seen| {
+        hint.at.iter().all(|p| inside(o.bounds, *p))
+            && !hint.not.iter().any(|p| inside(o.bounds, *p))
     };
     let (width, height) = (f64::from(photo.width()), f64::from(photo.height()));
-    let weight = |o: &FoundObject| {
+    let weight = |o: &Seen| {
         let [l, t, r, b] = o.bounds;
         if clicked {
             return o.score;
@@ -133,8 +139,25 @@ fn boxes(photo: &Photo, objects: &[FoundObject], hint: &Hint) -> Vec<(FoundObjec
         let cut_off = touched.into_iter().filter(|t| *t).map(|_| CUT_OFF).product::<f64>();
         o.score * central * area.sqrt().sqrt() * cut_off
     };
-    let mut all: Vec<(FoundObject, f64)> =
-        objects.iter().filter(|o| meant(o)).map(|o| (*o, weight(o))).collect();
+    let mut all: Vec<Seen> = Vec::new();
+    for o in objects.iter().filter(round) {
+        match all.iter_mut().find(|s| overlap(s.bounds, o.bounds) > SAME) {
+            Some(s) => {
+                let sure = o.score * o.score;
+                let mean = |k: usize| (s.sure * s.bounds[k] + sure * o.bounds[k]) / (s.sure + sure);
+                s.bounds = [0, 1, 2, 3].map(mean);
+                (s.score, s.sure) = (s.score + o.score, s.sure + sure);
+            }
+            None => all.push(Seen {
+                class: o.name(),
+                bounds: o.bounds,
+                score: o.score,
+                sure: o.score * o.score,
+            }),
+        }
+    }
+    let mut all: Vec<(Seen, f64)> =
+        all.into_iter().filter(meant).map(|o| (weight(&o), o)).map(|(w, o)| (o, w)).collect();
     all.sort_by(|a, b| b.1.total_cmp(&a.1));
     all.truncate(BOXES);
     all
