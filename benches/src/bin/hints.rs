@@ -8,8 +8,8 @@
 //! the true mask with noise, which depends on the folder's name only: the sides of a box
 //! are off by up to 8 % of its width or height (uniform); foot, top and width of an axis
 //! by 3 % of its length (normal); eight clicks around the outline, at equal arc lengths,
-//! by 2 % of the longer side of its box (normal); a click is a random pixel of the mask
-//! that is at least half as far from the outline as the furthest one. The release binary
+//! by 2 % of the longer side of its box (normal); a click is about the mask's centroid, by 10 %
+//! of its width and height (normal), on the mask. The release binary
 //! of the command runs each case.
 //!
 //! Prints for each case the median intersection over union of the fitted and the true mask
@@ -20,7 +20,7 @@ use pcadlang_library::scene::ImageValue;
 use pcadlang_numerics::rng::{Purpose, Stream, StreamKey};
 use pcadlang_scene::vision::candidates::CandidateOptions;
 use pcadlang_scene::vision::segmentation::from_mask;
-use pcadlang_scene::vision::{Limits, Mask, distance_transform, mask, photo};
+use pcadlang_scene::vision::{Hint, Limits, Mask, mask, photo};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -29,6 +29,7 @@ const KINDS: [&str; 6] = ["none", "at", "box", "axis", "outline", "mask"];
 const BOX: f64 = 0.08;
 const AXIS: f64 = 0.03;
 const OUTLINE: f64 = 0.02;
+const CLICK: f64 = 0.1;
 const CLICKS: usize = 8;
 
 /// What is measured.
@@ -164,13 +165,22 @@ fn hint(kind: &str, case: &Case) -> Result<Vec<String>, String> {
             vec!["--box".into(), format!("{l:.1},{t:.1},{:.1},{:.1}", r - l, b - t)]
         }
         "at" => {
-            let outside: Vec<bool> = m.data().iter().map(|on| !on).collect();
-            let away = distance_transform(m.width(), m.height(), &outside).values;
-            let most = away.iter().copied().fold(0.0, f32::max);
-            let deep: Vec<usize> = (0..away.len()).filter(|i| away[*i] >= 0.5 * most).collect();
-            let i = deep[rng.index(deep.len())];
-            let (column, row) = (i % m.width() as usize, i / m.width() as usize);
-            vec!["--at".into(), format!("{column}.5,{row}.5")]
+            let on: Vec<usize> = (0..m.data().len()).filter(|i| m.data()[*i]).collect();
+            let mean = |of: &dyn Fn(usize) -> usize| {
+                on.iter().map(|i| of(*i) as f64 + 0.5).sum::<f64>() / on.len() as f64
+            };
+            let (w0, h0) = (m.width() as usize, m.height() as usize);
+            let (cx, cy) = (mean(&|i| i % w0), mean(&|i| i / w0));
+            loop {
+                let at = [
+                    cx + CLICK * w * rng.standard_normal(),
+                    cy + CLICK * h * rng.standard_normal(),
+                ];
+                let (i, j) = (at[0] as usize, at[1] as usize);
+                if at.iter().all(|x| *x >= 0.0) && i < w0 && j < h0 && m.data()[j * w0 + i] {
+                    break vec!["--at".into(), point(at)];
+                }
+            }
         }
         "outline" => {
             let corners = outline(m);
@@ -192,7 +202,7 @@ fn hint(kind: &str, case: &Case) -> Result<Vec<String>, String> {
             let lean = |a: &&pcadlang_scene::vision::candidates::Axis| {
                 ((a.top[0] - a.foot[0]) / (a.foot[1] - a.top[1])).abs()
             };
-            let good = axes.iter().filter(|a| a.symmetry > best - 0.04);
+            let good = axes.iter().filter(|a| a.symmetry > best - 0.12);
             let axis = good.min_by(|a, b| lean(a).total_cmp(&lean(b))).ok_or("no axis")?;
             let length = f64::hypot(axis.top[0] - axis.foot[0], axis.top[1] - axis.foot[1]);
             let mut off = || AXIS * length * rng.standard_normal();
@@ -243,13 +253,22 @@ fn median(values: &mut [f64]) -> f64 {
 }
 
 /// Prints the places of a case, with the overlap of each outline and the truth.
-fn show_places(case: &Case) -> Result<(), String> {
+fn show_places(case: &Case, kind: &str) -> Result<(), String> {
     let bytes = std::fs::read(&case.image).map_err(|e| e.to_string())?;
     let photo = photo::decode(&bytes, &Limits::default()).map_err(|e| e.to_string())?;
     let image = ImageValue::photo(photo);
-    let places = image.places(&CandidateOptions::default(), image.hint());
-    println!("{}: box {:.0?}", case.name, bounds(&case.mask));
-    for p in places.map_err(|e| e.message)?.iter().take(6) {
+    let mut wanted = Hint::default();
+    if let [_, at] = &hint(kind, case)?[..] {
+        let numbers: Vec<f64> = at.split(',').filter_map(|x| x.parse().ok()).collect();
+        match numbers[..] {
+            [x, y] => wanted.at = vec![[x, y]],
+            [x, y, w, h] => wanted.bounds = Some([x, y, w, h]),
+            _ => {}
+        }
+    }
+    let places = image.places(&CandidateOptions::default(), &wanted);
+    println!("{}: box {:.0?}, {wanted:?}", case.name, bounds(&case.mask));
+    for p in places.map_err(|e| e.message)?.iter().take(24) {
         let truth = |m: &Mask| overlap(m, &case.mask.resized(m.width(), m.height()));
         let overlaps: Vec<f64> = p.masks.iter().map(truth).collect();
         let apart = match &p.masks[..] {
@@ -270,8 +289,10 @@ fn overlap(a: &Mask, b: &Mask) -> f64 {
 fn main() -> Result<(), String> {
     let s = settings()?;
     let cases = cases(&s)?;
-    if s.kinds == ["places"] {
-        return cases.iter().try_for_each(show_places);
+    if let [first, kind] = &s.kinds[..]
+        && first == "places"
+    {
+        return cases.iter().try_for_each(|c| show_places(c, kind));
     }
     for kind in &s.kinds {
         let mut medians = Vec::new();

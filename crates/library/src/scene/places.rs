@@ -12,13 +12,16 @@ const ROUND: [&str; 7] = ["bottle", "wine glass", "cup", "bowl", "apple", "orang
 /// The maximum number of boxes of the detector.
 const BOXES: usize = 3;
 /// The minimum score of an object.
-const LEAST: f64 = 0.08;
+const LEAST: f64 = 0.05;
 /// Boxes that overlap more than this (intersection over union) are of one object.
 const SAME: f64 = 0.75;
 /// The weight of all regions together; that of a box that is seen clearly is about 0.5.
 const REGIONS: f64 = 0.1;
 /// Each side of the picture that a box touches multiplies its weight by this.
 const CUT_OFF: f64 = 0.6;
+
+/// The standard deviation of a click about the middle of a box, in widths and heights.
+const CLICKED: f64 = 0.2;
 
 /// A place where an object may be.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,9 +96,7 @@ pub(super) fn places(
         Place::guessed(o.class, *weight, bounds, &all)
     });
     let mut all: Vec<Place> = seen.collect();
-    // A click in a box leaves no doubt that the box is meant.
-    let clicked = !hint.at.is_empty() && !all.is_empty();
-    let unseen = if clicked { 0.0 } else { REGIONS };
+    let unseen = REGIONS;
     let seen = all.iter().map(|p| p.score).sum::<f64>();
     let share = unseen / (unseen + seen);
     all.iter_mut().for_each(|p| p.score /= unseen + seen);
@@ -119,7 +120,7 @@ struct Seen {
 /// Returns the boxes that may be meant, with their weights, the best first.
 fn boxes(photo: &Photo, objects: &[FoundObject], hint: &Hint) -> Vec<(Seen, f64)> {
     let clicked = !hint.at.is_empty();
-    let round = |o: &&FoundObject| o.score >= LEAST && (clicked || ROUND.contains(&o.name()));
+    let round = |o: &&FoundObject| o.score >= LEAST && ROUND.contains(&o.name());
     let inside =
         |[l, t, r, b]: [f64; 4], [x, y]: [f64; 2]| (l..=r).contains(&x) && (t..=b).contains(&y);
     let meant = |o: &Seen| {
@@ -129,11 +130,18 @@ fn boxes(photo: &Photo, objects: &[FoundObject], hint: &Hint) -> Vec<(Seen, f64)
     let (width, height) = (f64::from(photo.width()), f64::from(photo.height()));
     let weight = |o: &Seen| {
         let [l, t, r, b] = o.bounds;
-        if clicked {
-            return o.score;
-        }
-        let off = [0.5 * (l + r) / width - 0.5, 0.5 * (t + b) / height - 0.5];
-        let central = libm::exp(-2.0 * (off[0] * off[0] + off[1] * off[1]));
+        let middle = [0.5 * (l + r), 0.5 * (t + b)];
+        // People click near the middle of a thing, and photograph it in the middle.
+        let central = if clicked {
+            let off = |[x, y]: &[f64; 2]| {
+                ((x - middle[0]) / (r - l)).powi(2) + ((y - middle[1]) / (b - t)).powi(2)
+            };
+            let off = hint.at.iter().map(off).sum::<f64>() / hint.at.len() as f64;
+            libm::exp(-off / (2.0 * CLICKED * CLICKED))
+        } else {
+            let off = [middle[0] / width - 0.5, middle[1] / height - 0.5];
+            libm::exp(-2.0 * (off[0] * off[0] + off[1] * off[1]))
+        };
         let area = (r - l) * (b - t) / (width * height);
         let touched = [l < 0.01 * width, t < 0.01 * height, r > 0.99 * width, b > 0.99 * height];
         let cut_off = touched.into_iter().filter(|t| *t).map(|_| CUT_OFF).product::<f64>();
