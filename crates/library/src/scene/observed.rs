@@ -4,12 +4,12 @@
 //! cached with it.
 
 use super::places::{self, Place};
-use super::{IMAGE, found_objects, native, people};
+use super::{IMAGE, found_objects, native, people, pointed_out};
 use pcadlang_detectors::people::Person;
 use pcadlang_engine::lang::builtins::{Domain, Row, Type, arg, int, num, opt};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::{Object, Value};
-use pcadlang_scene::vision::candidates::{CandidateOptions, enclosed};
+use pcadlang_scene::vision::candidates::{CandidateOptions, candidates, enclosed};
 use pcadlang_scene::vision::{
     ContourDetector, ContourMap, DepthMap, GradientDetector, Hint, Keypoints, MAP_SIZE,
     MOST_MAP_SIZE, Mask, Photo, SoftMap,
@@ -139,8 +139,13 @@ impl ImageValue {
     /// Returns the people that programs detected in it, in the order of its hint, the most
     /// prominent first; `None` if no program did.
     pub fn people(&self) -> Option<Vec<Person>> {
+        self.people_by(&self.hint)
+    }
+
+    /// The same in the order of another hint.
+    pub(super) fn people_by(&self, hint: &Hint) -> Option<Vec<Person>> {
         let all = self.prepared().first::<PeopleKey, Vec<(Person, Value)>>()?;
-        let order = people::order(&all, &self.hint, self.size());
+        let order = people::order(&all, hint, self.size());
         Some(order.into_iter().map(|i| all[i].0.clone()).collect())
     }
 
@@ -155,9 +160,29 @@ impl ImageValue {
         hint: &Hint,
     ) -> Result<Arc<Vec<Place>>, Fault> {
         self.prepared().get((*options, hint.clone()), |(options, hint)| match self.as_photo() {
-            Some(photo) => Ok(places::places(photo, &*found_objects::found(self)?, hint, options)),
+            Some(photo) => {
+                let objects = found_objects::found(self)?;
+                let search = |options: &_| Ok(candidates(photo, options));
+                let regions = || self.prepared().get(*options, search).map(|r| r.to_vec());
+                Ok(places::places(photo, &objects, hint, || regions().unwrap_or_default()))
+            }
             None => Ok(places::regions(&enclosed(self.map()?, options), 1.0)),
         })
+    }
+
+    /// Returns the place in the photograph that a hint points out, with guesses of its outline,
+    /// the best first, and mostly without axes: what a user is shown while pointing. `None` if
+    /// the hint is empty, which only finds the objects on which later answers are based, and if
+    /// nothing is known of the place.
+    ///
+    /// A quick answer comes within a tenth of a second once the objects are found: for a box,
+    /// and for a click on an object, it is an ellipse. Otherwise the outlines are those of
+    /// [`ImageValue::places`], after a search of regions if no object was clicked.
+    ///
+    /// # Errors
+    /// If the hint does not suit the photograph ([`Hint::check`]) or a detector fails.
+    pub fn pointed_out(&self, hint: &Hint, quick: bool) -> Result<Option<Place>, Fault> {
+        pointed_out::pointed_out(self, hint, quick)
     }
 
     /// Returns its contours, detecting them if necessary.

@@ -2,7 +2,7 @@
 //! the boxes of a detector, or in regions that are nearly mirror-symmetric.
 
 use pcadlang_detectors::objects::FoundObject;
-use pcadlang_scene::vision::candidates::{Axis, Candidate, CandidateOptions, candidates};
+use pcadlang_scene::vision::candidates::{Axis, Candidate};
 use pcadlang_scene::vision::segmentation::{Guess, Method, from_mask, guesses};
 use pcadlang_scene::vision::{Hint, Mask, Photo};
 
@@ -53,10 +53,19 @@ impl Place {
         Place { masks: vec![c.mask.clone()], axes: normalised(axes), ..Place::anywhere(score) }
     }
 
+    /// A place with outlines, and no axes yet.
+    pub(super) fn outlined(
+        source: &str,
+        score: f64,
+        bounds: Option<[f64; 4]>,
+        masks: Vec<Mask>,
+    ) -> Place {
+        Place { score, source: source.into(), bounds, masks, axes: Vec::new() }
+    }
+
     /// A place that nothing points to.
     pub(super) fn anywhere(score: f64) -> Place {
-        let (source, bounds, masks, axes) = ("region".into(), None, Vec::new(), Vec::new());
-        Place { score, source, bounds, masks, axes }
+        Place::outlined("region", score, None, Vec::new())
     }
 }
 
@@ -67,17 +76,17 @@ fn normalised(mut axes: Vec<(Axis, f64)>) -> Vec<(Axis, f64)> {
 }
 
 /// Returns the places of a photograph that a hint leaves open, the most probable first.
+/// `found` searches its regions, which is done only if they matter.
 pub(super) fn places(
     photo: &Photo,
     objects: &[FoundObject],
     hint: &Hint,
-    options: &CandidateOptions,
+    found: impl FnOnce() -> Vec<Candidate>,
 ) -> Vec<Place> {
     if let Some(mask) = hint.drawn(photo.width(), photo.height()) {
         let axes = from_mask(photo, &mask).into_iter().zip([0.8, 0.2]).collect();
-        let (source, bounds) = ("drawn".into(), None);
-        let masks = vec![mask];
-        return vec![Place { score: 1.0, source, bounds, masks, axes: normalised(axes) }];
+        let drawn = Place::outlined("drawn", 1.0, None, vec![mask]);
+        return vec![Place { axes: normalised(axes), ..drawn }];
     }
     if hint.axis.is_some() || hint.bounds.is_some() {
         let source = if hint.axis.is_some() { "axis" } else { "box" };
@@ -85,8 +94,7 @@ pub(super) fn places(
     }
     let boxes = boxes(photo, objects, hint);
     let seen = boxes.iter().map(|(o, weight)| {
-        let [l, t, r, b] = o.bounds;
-        let bounds = Some([l, t, r - l, b - t]);
+        let bounds = Some(sized(o.bounds));
         let all = guesses(photo, &Hint { bounds, ..hint.clone() }, &Method::ALL);
         Place::guessed(o.name(), *weight, bounds, &all)
     });
@@ -101,13 +109,22 @@ pub(super) fn places(
     };
     all.iter_mut().for_each(|p| p.score *= (1.0 - share) / seen);
     if share > 0.0 {
-        all.extend(regions(&meant(candidates(photo, options), photo, hint), share));
+        all.extend(regions(&meant(found(), photo, hint), share));
     }
     all
 }
 
+/// Returns left, top, width and height of a box of left, top, right and bottom.
+pub(super) fn sized([left, top, right, bottom]: [f64; 4]) -> [f64; 4] {
+    [left, top, right - left, bottom - top]
+}
+
 /// Returns the detector's boxes that may be meant, with their weights, the best first.
-fn boxes(photo: &Photo, objects: &[FoundObject], hint: &Hint) -> Vec<(FoundObject, f64)> {
+pub(super) fn boxes(
+    photo: &Photo,
+    objects: &[FoundObject],
+    hint: &Hint,
+) -> Vec<(FoundObject, f64)> {
     let clicked = !hint.at.is_empty();
     let least = if clicked { LEAST_CLICKED } else { LEAST };
     let inside = |o: &FoundObject, [x, y]: [f64; 2]| {

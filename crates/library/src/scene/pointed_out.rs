@@ -1,0 +1,72 @@
+//! What a user is shown while pointing out an object: the place that is meant, without axes
+//! and before anything is sampled.
+
+use super::places::{Place, boxes, sized};
+use super::{ImageValue, found_objects};
+use pcadlang_detectors::people::Person;
+use pcadlang_engine::lang::error::Fault;
+use pcadlang_scene::vision::candidates::CandidateOptions;
+use pcadlang_scene::vision::photo::fitted;
+use pcadlang_scene::vision::segmentation::{Method, guesses};
+use pcadlang_scene::vision::{Hint, Mask, Photo};
+
+/// The maximum longer side of masks, pixels.
+const LARGEST: u32 = 256;
+
+/// See [`ImageValue::pointed_out`].
+pub(super) fn pointed_out(
+    image: &ImageValue,
+    hint: &Hint,
+    quick: bool,
+) -> Result<Option<Place>, Fault> {
+    let Some(photo) = image.as_photo() else { return Ok(None) };
+    hint.check(photo.width(), photo.height()).map_err(|e| Fault::domain(e.to_string()))?;
+    if let Some(mask) = drawn(photo, hint) {
+        return Ok(Some(Place::outlined("drawn", 1.0, None, vec![mask])));
+    }
+    // A program about people takes the one at the hint, wherever objects are.
+    let people = image.people_by(hint).unwrap_or_default();
+    if let Some(person) = people.first() {
+        return Ok((!hint.is_empty()).then(|| of_person(photo, person)));
+    }
+    let objects = found_objects::found(image)?;
+    if hint.is_empty() {
+        return Ok(None);
+    }
+    if !quick {
+        let places = image.places(&CandidateOptions::default(), hint)?;
+        return Ok(places.first().cloned());
+    }
+    let (source, score, bounds) = match (hint.axis, hint.bounds) {
+        (Some(_), bounds) => ("axis", 1.0, bounds),
+        (None, Some(bounds)) => ("box", 1.0, Some(bounds)),
+        (None, None) => {
+            let seen = boxes(photo, &objects, hint);
+            let Some((object, weight)) = seen.first() else { return Ok(None) };
+            let total: f64 = seen.iter().map(|(_, weight)| weight).sum();
+            (object.name(), weight / total, Some(sized(object.bounds)))
+        }
+    };
+    let ellipse = guesses(photo, &Hint { bounds, ..hint.clone() }, &[Method::Ellipse]);
+    let masks = ellipse.into_iter().take(1).map(|g| g.mask).collect();
+    Ok(Some(Place::outlined(source, score, bounds, masks)))
+}
+
+/// Returns what the user drew, at a size at which that takes no time.
+fn drawn(photo: &Photo, hint: &Hint) -> Option<Mask> {
+    let (width, height) = fitted(photo.width(), photo.height(), LARGEST);
+    let scale = [
+        f64::from(width) / f64::from(photo.width()),
+        f64::from(height) / f64::from(photo.height()),
+    ];
+    let outline = hint.outline.iter().map(|[x, y]| [x * scale[0], y * scale[1]]).collect();
+    Hint { mask: hint.mask.clone(), outline, ..Hint::default() }.drawn(width, height)
+}
+
+fn of_person(photo: &Photo, person: &Person) -> Place {
+    let (width, height) = fitted(photo.width(), photo.height(), LARGEST);
+    let pixels = person.mask(width, height, photo.width());
+    let mask = Mask::new(width, height, pixels.into_iter().map(|m| m > 0.5).collect());
+    let bounds = Some(sized(person.bounds));
+    Place::outlined("person", person.sure, bounds, mask.into_iter().collect())
+}
