@@ -79,10 +79,7 @@ fn an_outline_is_its_own_answer() {
     std::fs::copy("examples/images/coffee_cup.png", s.folder.join("mask.png")).unwrap();
     let place = guess(&mut page, json!({ "mask": "mask.png" }), true);
     assert!(place["source"] == "drawn" && is_inside(&place, [107.0, 55.0]), "{place}");
-    let said = page.refused(
-        "guess",
-        json!({ "session": 1, "hint": { "mask": "../mask.png" } }),
-    );
+    let said = page.refused("guess", json!({ "session": 1, "hint": { "mask": "../mask.png" } }));
     assert!(said.contains("../mask.png"), "{said}");
 }
 

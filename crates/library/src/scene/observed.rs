@@ -4,7 +4,7 @@
 //! cached with it.
 
 use super::places::{self, Place};
-use super::{IMAGE, found_objects, native, people, pointed_out};
+use super::{IMAGE, found_objects, native, people};
 use pcadlang_detectors::people::Person;
 use pcadlang_engine::lang::builtins::{Domain, Row, Type, arg, int, num, opt};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
@@ -161,28 +161,12 @@ impl ImageValue {
     ) -> Result<Arc<Vec<Place>>, Fault> {
         self.prepared().get((*options, hint.clone()), |(options, hint)| match self.as_photo() {
             Some(photo) => {
-                let objects = found_objects::found(self)?;
-                let search = |options: &_| Ok(candidates(photo, options));
-                let regions = || self.prepared().get(*options, search).map(|r| r.to_vec());
-                Ok(places::places(photo, &objects, hint, || regions().unwrap_or_default()))
+                let objects = || found_objects::found(self);
+                let regions = || self.prepared().get(*options, |o| Ok(candidates(photo, o)));
+                places::places(photo, hint, objects, regions)
             }
             None => Ok(places::regions(&enclosed(self.map()?, options), 1.0)),
         })
-    }
-
-    /// Returns the place in the photograph that a hint points out, with guesses of its outline,
-    /// the best first, and mostly without axes: what a user is shown while pointing. `None` if
-    /// the hint is empty, which only finds the objects on which later answers are based, and if
-    /// nothing is known of the place.
-    ///
-    /// A quick answer comes within a tenth of a second once the objects are found: for a box,
-    /// and for a click on an object, it is an ellipse. Otherwise the outlines are those of
-    /// [`ImageValue::places`], after a search of regions if no object was clicked.
-    ///
-    /// # Errors
-    /// If the hint does not suit the photograph ([`Hint::check`]) or a detector fails.
-    pub fn pointed_out(&self, hint: &Hint, quick: bool) -> Result<Option<Place>, Fault> {
-        pointed_out::pointed_out(self, hint, quick)
     }
 
     /// Returns its contours, detecting them if necessary.

@@ -2,9 +2,11 @@
 //! the boxes of a detector, or in regions that are nearly mirror-symmetric.
 
 use pcadlang_detectors::objects::FoundObject;
+use pcadlang_engine::lang::error::Fault;
 use pcadlang_scene::vision::candidates::{Axis, Candidate};
 use pcadlang_scene::vision::segmentation::{Guess, Method, from_mask, guesses};
 use pcadlang_scene::vision::{Hint, Mask, Photo};
+use std::sync::Arc;
 
 /// The classes of COCO that are objects of revolution.
 const ROUND: [&str; 7] = ["bottle", "wine glass", "cup", "bowl", "apple", "orange", "vase"];
@@ -76,23 +78,27 @@ fn normalised(mut axes: Vec<(Axis, f64)>) -> Vec<(Axis, f64)> {
 }
 
 /// Returns the places of a photograph that a hint leaves open, the most probable first.
-/// `found` searches its regions, which is done only if they matter.
+/// Its `objects` and `found` regions are searched only if they matter.
+///
+/// # Errors
+/// Those of the searches.
 pub(super) fn places(
     photo: &Photo,
-    objects: &[FoundObject],
     hint: &Hint,
-    found: impl FnOnce() -> Vec<Candidate>,
-) -> Vec<Place> {
+    objects: impl FnOnce() -> Result<Arc<Vec<FoundObject>>, Fault>,
+    found: impl FnOnce() -> Result<Arc<Vec<Candidate>>, Fault>,
+) -> Result<Vec<Place>, Fault> {
     if let Some(mask) = hint.drawn(photo.width(), photo.height()) {
         let axes = from_mask(photo, &mask).into_iter().zip([0.8, 0.2]).collect();
         let drawn = Place::outlined("drawn", 1.0, None, vec![mask]);
-        return vec![Place { axes: normalised(axes), ..drawn }];
+        return Ok(vec![Place { axes: normalised(axes), ..drawn }]);
     }
     if hint.axis.is_some() || hint.bounds.is_some() {
         let source = if hint.axis.is_some() { "axis" } else { "box" };
-        return vec![Place::guessed(source, 1.0, hint.bounds, &guesses(photo, hint, &Method::ALL))];
+        let all = guesses(photo, hint, &Method::ALL);
+        return Ok(vec![Place::guessed(source, 1.0, hint.bounds, &all)]);
     }
-    let boxes = boxes(photo, objects, hint);
+    let boxes = boxes(photo, &*objects()?, hint);
     let seen = boxes.iter().map(|(o, weight)| {
         let bounds = Some(sized(o.bounds));
         let all = guesses(photo, &Hint { bounds, ..hint.clone() }, &Method::ALL);
@@ -109,9 +115,9 @@ pub(super) fn places(
     };
     all.iter_mut().for_each(|p| p.score *= (1.0 - share) / seen);
     if share > 0.0 {
-        all.extend(regions(&meant(found(), photo, hint), share));
+        all.extend(regions(&meant(found()?.to_vec(), photo, hint), share));
     }
-    all
+    Ok(all)
 }
 
 /// Returns left, top, width and height of a box of left, top, right and bottom.
@@ -141,7 +147,7 @@ pub(super) fn boxes(
     let weight = |o: &FoundObject| {
         let [l, t, r, b] = o.bounds;
         if clicked {
-            return o.score;
+            return o.score * clicks(o.bounds, &hint.at);
         }
         let off = [0.5 * (l + r) / width - 0.5, 0.5 * (t + b) / height - 0.5];
         let central = libm::exp(-2.0 * (off[0] * off[0] + off[1] * off[1]));
@@ -155,6 +161,17 @@ pub(super) fn boxes(
     all.sort_by(|a, b| b.1.total_cmp(&a.1));
     all.truncate(BOXES);
     all
+}
+
+/// Returns the density of clicks on the object in a box of left, top, right and bottom: about its
+/// middle, with a standard deviation of a quarter of each side, so that what lies before a large
+/// thing is meant rather than that. Several clicks, which are not independent, count as one.
+fn clicks([l, t, r, b]: [f64; 4], at: &[[f64; 2]]) -> f64 {
+    let (middle, half) =
+        ([0.5 * (l + r), 0.5 * (t + b)], [r - l, b - t].map(|s| f64::max(0.5 * s, 0.5)));
+    let off = |p: &[f64; 2]| [0, 1].map(|c| (p[c] - middle[c]) / half[c]);
+    let far = at.iter().map(off).map(|[x, y]| x * x + y * y).sum::<f64>() / at.len() as f64;
+    libm::exp(-2.0 * far) / (half[0] * half[1])
 }
 
 /// Returns regions as places, the weights of which add up to `share`.
