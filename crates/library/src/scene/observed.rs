@@ -4,12 +4,12 @@
 //! cached with it.
 
 use super::places::{self, Place};
-use super::{IMAGE, found_objects, native, people};
+use super::{IMAGE, native, people};
 use pcadlang_detectors::people::Person;
 use pcadlang_engine::lang::builtins::{Domain, Row, Type, arg, int, num, opt};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::{Object, Value};
-use pcadlang_scene::vision::candidates::{CandidateOptions, candidates, enclosed};
+use pcadlang_scene::vision::candidates::{CandidateOptions, enclosed};
 use pcadlang_scene::vision::{
     ContourDetector, ContourMap, DepthMap, GradientDetector, Hint, Keypoints, MAP_SIZE,
     MOST_MAP_SIZE, Mask, Photo, SoftMap,
@@ -160,11 +160,7 @@ impl ImageValue {
         hint: &Hint,
     ) -> Result<Arc<Vec<Place>>, Fault> {
         self.prepared().get((*options, hint.clone()), |(options, hint)| match self.as_photo() {
-            Some(photo) => {
-                let objects = || found_objects::found(self);
-                let regions = || self.prepared().get(*options, |o| Ok(candidates(photo, o)));
-                places::places(photo, hint, objects, regions)
-            }
+            Some(photo) => places::places(self, photo, hint, options),
             None => Ok(places::regions(&enclosed(self.map()?, options), 1.0)),
         })
     }

@@ -1,9 +1,10 @@
 //! Places in a photograph where an object of revolution may be: where the user points, in
 //! the boxes of a detector, or in regions that are nearly mirror-symmetric.
 
+use super::{ImageValue, found_objects};
 use pcadlang_detectors::objects::FoundObject;
 use pcadlang_engine::lang::error::Fault;
-use pcadlang_scene::vision::candidates::{Axis, Candidate};
+use pcadlang_scene::vision::candidates::{Axis, Candidate, CandidateOptions, candidates};
 use pcadlang_scene::vision::segmentation::{Guess, Method, from_mask, guesses};
 use pcadlang_scene::vision::{Hint, Mask, Photo};
 use std::sync::Arc;
@@ -37,7 +38,12 @@ pub struct Place {
 }
 
 impl Place {
-    fn guessed(source: &str, score: f64, bounds: Option<[f64; 4]>, all: &[Guess]) -> Place {
+    pub(super) fn guessed(
+        source: &str,
+        score: f64,
+        bounds: Option<[f64; 4]>,
+        all: &[Guess],
+    ) -> Place {
         let first = |method| all.iter().find(|g| g.method == method).map(|g| g.mask.clone());
         let masks = [Method::Symmetric, Method::Cut].into_iter().filter_map(first).collect();
         // Each method has the same weight; later guesses and axes of one have half the
@@ -77,16 +83,31 @@ fn normalised(mut axes: Vec<(Axis, f64)>) -> Vec<(Axis, f64)> {
     axes
 }
 
-/// Returns the places of a photograph that a hint leaves open, the most probable first.
-/// Its `objects` and `found` regions are searched only if they matter.
+impl ImageValue {
+    /// Returns guesses by all methods for a hint with a box or an axis.
+    pub(super) fn guesses(&self, photo: &Photo, hint: &Hint) -> Result<Arc<Vec<Guess>>, Fault> {
+        self.prepared().get(hint.clone(), |hint| Ok(guesses(photo, hint, &Method::ALL)))
+    }
+
+    fn regions(
+        &self,
+        photo: &Photo,
+        options: &CandidateOptions,
+    ) -> Result<Arc<Vec<Candidate>>, Fault> {
+        self.prepared().get(*options, |options| Ok(candidates(photo, options)))
+    }
+}
+
+/// Returns the places of an image's photograph that a hint leaves open, the most probable
+/// first.
 ///
 /// # Errors
-/// Those of the searches.
+/// Those of the detector.
 pub(super) fn places(
+    image: &ImageValue,
     photo: &Photo,
     hint: &Hint,
-    objects: impl FnOnce() -> Result<Arc<Vec<FoundObject>>, Fault>,
-    found: impl FnOnce() -> Result<Arc<Vec<Candidate>>, Fault>,
+    options: &CandidateOptions,
 ) -> Result<Vec<Place>, Fault> {
     if let Some(mask) = hint.drawn(photo.width(), photo.height()) {
         let axes = from_mask(photo, &mask).into_iter().zip([0.8, 0.2]).collect();
@@ -95,16 +116,16 @@ pub(super) fn places(
     }
     if hint.axis.is_some() || hint.bounds.is_some() {
         let source = if hint.axis.is_some() { "axis" } else { "box" };
-        let all = guesses(photo, hint, &Method::ALL);
+        let all = image.guesses(photo, hint)?;
         return Ok(vec![Place::guessed(source, 1.0, hint.bounds, &all)]);
     }
-    let boxes = boxes(photo, &*objects()?, hint);
+    let boxes = boxes(photo, &*found_objects::found(image)?, hint);
     let seen = boxes.iter().map(|(o, weight)| {
         let bounds = Some(sized(o.bounds));
-        let all = guesses(photo, &Hint { bounds, ..hint.clone() }, &Method::ALL);
-        Place::guessed(o.name(), *weight, bounds, &all)
+        let all = image.guesses(photo, &Hint { bounds, ..hint.clone() })?;
+        Ok(Place::guessed(o.name(), *weight, bounds, &all))
     });
-    let mut all: Vec<Place> = seen.collect();
+    let mut all: Vec<Place> = seen.collect::<Result<_, Fault>>()?;
     let weight = |places: &[Place]| places.iter().map(|p| p.score).sum::<f64>();
     let seen = weight(&all);
     // A click on a box that is seen leaves no doubt.
@@ -115,7 +136,7 @@ pub(super) fn places(
     };
     all.iter_mut().for_each(|p| p.score *= (1.0 - share) / seen);
     if share > 0.0 {
-        all.extend(regions(&meant(found()?.to_vec(), photo, hint), share));
+        all.extend(regions(&meant(image.regions(photo, options)?.to_vec(), photo, hint), share));
     }
     Ok(all)
 }

@@ -39,21 +39,27 @@ impl ImageValue {
         if hint.is_empty() {
             return found_objects::found(self).map(|_| None);
         }
-        if !quick {
-            let places = self.places(&CandidateOptions::default(), hint)?;
-            return Ok(places.first().cloned());
-        }
         let (source, score, bounds) = match (hint.axis, hint.bounds) {
             (Some(_), bounds) => ("axis", 1.0, bounds),
             (None, Some(bounds)) => ("box", 1.0, Some(bounds)),
             (None, None) => {
                 let seen = boxes(photo, &*found_objects::found(self)?, hint);
-                let Some((object, weight)) = seen.first() else { return Ok(None) };
                 let total: f64 = seen.iter().map(|(_, weight)| weight).sum();
-                (object.name(), weight / total, Some(sized(object.bounds)))
+                match seen.first() {
+                    Some((o, weight)) => (o.name(), weight / total, Some(sized(o.bounds))),
+                    None if quick => return Ok(None),
+                    None => {
+                        let places = self.places(&CandidateOptions::default(), hint)?;
+                        return Ok(places.first().cloned());
+                    }
+                }
             }
         };
-        let ellipse = guesses(photo, &Hint { bounds, ..hint.clone() }, &[Method::Ellipse]);
+        let hint = Hint { bounds, ..hint.clone() };
+        if !quick {
+            return Ok(Some(Place::guessed(source, score, bounds, &self.guesses(photo, &hint)?)));
+        }
+        let ellipse = guesses(photo, &hint, &[Method::Ellipse]);
         let masks = ellipse.into_iter().take(1).map(|g| g.mask).collect();
         Ok(Some(Place::outlined(source, score, bounds, masks)))
     }
