@@ -87,10 +87,10 @@ async function step(name, task) {
 try {
   const tools = { open, step, out, update: values.update, program, viewer: values.page };
   await appearance(tools);
-  await hint(tools);
   await scenario(tools);
   await language(tools);
   await keyboard(tools);
+  await hint(tools);
   await standalone(tools);
   await step("no page reported an error", async () => {
     const errors = opened.flatMap(({ errors }) => errors);

@@ -40,6 +40,8 @@ const TOOLS: [Tool, string, string][] = [
   ],
 ];
 
+/** What the drawing over the photograph shows while no tool is chosen. */
+const POINTED_OUT = "What was pointed out";
 /** How near a press is to what it means, in CSS pixels. */
 const NEAR = { mouse: 9, touch: 22 };
 /** How far an arrow key moves the cross, as a part of the photograph's longer side. */
@@ -91,7 +93,8 @@ export class HintLayer {
     this.bar = h("div", { class: "tools hint-bar" }, group, this.clear, this.said);
     this.element = svg("svg", {
       class: "hint-layer",
-      role: "application",
+      role: "img",
+      "aria-label": POINTED_OUT,
       preserveAspectRatio: "xMidYMid meet",
     });
     this.listen();
@@ -142,7 +145,8 @@ export class HintLayer {
     for (const [t, element] of this.tools) element.setAttribute("aria-pressed", String(t === tool));
     const about = TOOLS.find(([t]) => t === tool)?.[2] ?? "";
     const keys = "Arrow keys move a cross, the space bar presses there.";
-    this.element.setAttribute("aria-label", tool ? `Photograph. ${about}. ${keys}` : "Photograph");
+    this.element.setAttribute("role", tool ? "application" : "img");
+    this.element.setAttribute("aria-label", tool ? `Photograph. ${about}. ${keys}` : POINTED_OUT);
     if (tool) this.element.setAttribute("tabindex", "0");
     else this.element.removeAttribute("tabindex");
     this.draw();
