@@ -82,13 +82,15 @@ mod tests {
     }
 
     #[test]
-    fn teeth_are_smoothed_and_the_rest_stays() {
-        let comb = mask(|x, y| (5..=25).contains(&y) && (10..20 + 8 * (y % 2)).contains(&x));
+    fn teeth_are_short_and_the_rest_stays() {
+        let comb = mask(|x, y| {
+            let end = if y % 3 == 0 { 28 } else { 20 };
+            (5..=25).contains(&y) && (10..end).contains(&x)
+        });
         let whole: Vec<[f64; 2]> = outlines(&comb, (80, 60)).concat();
-        assert!(whole.len() < 30, "{whole:?}");
-        for (c, wanted) in [(0, [20.0, 48.0]), (1, [10.0, 52.0])] {
+        for (c, wanted) in [(0, [20.0, 40.0]), (1, [10.0, 52.0])] {
             let ends = [f64::min, f64::max].map(|f| whole.iter().map(|p| p[c]).reduce(f).unwrap());
-            assert!(ends.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 9.0), "{ends:?}");
+            assert!(ends.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 6.5), "{ends:?}");
         }
         let thin = mask(|x, _| x == 7);
         assert_eq!(outlines(&thin, (40, 30)), thin.outlines());

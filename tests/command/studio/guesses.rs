@@ -64,8 +64,8 @@ fn a_click_is_answered_with_what_is_seen_there() {
         assert_eq!(place["source"], "cup");
         assert!(is_inside(&place, [150.0, 110.0]), "{place}");
     }
-    // Where no object is seen, regions are searched, but not quickly.
-    let hint = json!({ "at": [[300.0, 20.0]], "not": [[155.0, 75.0]] });
+    // Where no object is left, regions are searched, but not quickly.
+    let hint = json!({ "not": [[155.0, 75.0]] });
     assert!(guess(&mut page, hint.clone(), true).is_null());
     assert_eq!(guess(&mut page, hint, false)["source"], "region");
 }
