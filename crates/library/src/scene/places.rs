@@ -119,7 +119,7 @@ pub(super) fn places(
         let all = image.guesses(photo, hint)?;
         return Ok(vec![Place::guessed(source, 1.0, hint.bounds, &all)]);
     }
-    let boxes = boxes(photo, &*found_objects::found(image)?, hint);
+    let boxes = boxes(photo, &found_objects::found(image)?, hint);
     let seen = boxes.iter().map(|(o, weight)| {
         let bounds = Some(sized(o.bounds));
         let all = image.guesses(photo, &Hint { bounds, ..hint.clone() })?;

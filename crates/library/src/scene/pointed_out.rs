@@ -43,7 +43,7 @@ impl ImageValue {
             (Some(_), bounds) => ("axis", 1.0, bounds),
             (None, Some(bounds)) => ("box", 1.0, Some(bounds)),
             (None, None) => {
-                let seen = boxes(photo, &*found_objects::found(self)?, hint);
+                let seen = boxes(photo, &found_objects::found(self)?, hint);
                 let total: f64 = seen.iter().map(|(_, weight)| weight).sum();
                 match seen.first() {
                     Some((o, weight)) => (o.name(), weight / total, Some(sized(o.bounds))),
