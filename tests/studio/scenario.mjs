@@ -2,6 +2,7 @@
 
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
+import { onPage } from "./hint.mjs";
 import {
   bestJoint,
   check,
@@ -58,6 +59,20 @@ export async function scenario({ open, step, out, program }) {
     await page.getByText("@cloth", { exact: true }).waitFor();
     await settled(page, PICTURE);
     await shot("human-prior");
+  });
+
+  await step("a click chooses the person", async () => {
+    await press("Point");
+    const [at] = await onPage(page, [[172, 190]]);
+    await page.mouse.click(...at);
+    await page.locator(".hint-layer .guess").waitFor();
+    const said = await page.locator(".hint-bar output").innerText();
+    check(said.startsWith("person"), `the page says \`${said}\``);
+    await shot("human-click");
+    await press("Clear");
+    await page.locator(".hint-layer .guess").waitFor({ state: "detached" });
+    await press("Point");
+    await settled(page, PICTURE);
   });
 
   await step("a run improves the overlay", async () => {

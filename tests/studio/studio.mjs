@@ -10,6 +10,7 @@ import { parseArgs } from "node:util";
 import { openPage, startBrowser } from "./browser.mjs";
 import { startProgram } from "./program.mjs";
 import { appearance } from "./appearance.mjs";
+import { hint } from "./hint.mjs";
 import { keyboard } from "./keyboard.mjs";
 import { language } from "./language.mjs";
 import { scenario } from "./scenario.mjs";
@@ -89,6 +90,7 @@ try {
   await scenario(tools);
   await language(tools);
   await keyboard(tools);
+  await hint(tools);
   await standalone(tools);
   await step("no page reported an error", async () => {
     const errors = opened.flatMap(({ errors }) => errors);

@@ -33,6 +33,12 @@ export interface Known {
 
 type Listener = () => void;
 
+interface Hinted {
+  session: number;
+  hint: P.Hint;
+  refused: (error: unknown) => void;
+}
+
 /** Holds what is known; listeners are called once per turn, after all changes of that turn. */
 export class Store {
   private known: Known = {
@@ -97,6 +103,7 @@ export class Actions {
   private readonly folder = new Latest<void>(() => this.readFolder(), (e) => this.onError(e));
   private readonly session = new Latest<void>(() => this.readSession(), (e) => this.onError(e));
   private readonly draws = new Latest<void>(() => this.readDraws(), (e) => this.onError(e));
+  private readonly hints = new Latest<Hinted>((asked) => this.sendHint(asked));
   /** The last session that this page opened. */
   private opened: number | null = null;
   private drawsTimer: ReturnType<typeof setTimeout> | null = null;
@@ -130,7 +137,14 @@ export class Actions {
 
   /** Opens a session of a program file. */
   async openProgram(program: string, observe: string[] = []): Promise<void> {
-    const session = await this.connection.ask<P.Session>("open", { program, observe });
+    await this.hints.rest;
+    const before = this.store.now.session;
+    let session = await this.connection.ask<P.Session>("open", { program, observe });
+    // The same photograph keeps its hint.
+    if (session.photo && JSON.stringify(before?.observe) === JSON.stringify(observe)) {
+      const params = { session: session.session, hint: before!.hint };
+      session = await this.connection.ask<P.Session>("hint", params);
+    }
     await this.closeLast(session.session);
     this.store.set({ session, view: "session", run: null, draws: null, modes: 0, at: null });
     this.onOpened(session);
@@ -151,8 +165,29 @@ export class Actions {
   async observe(observe: string[]): Promise<void> {
     const session = this.store.now.session;
     if (!session) throw new Error("open a program first: a photograph is observed by one");
+    await this.hints.rest;
     const params = { session: session.session, observe };
     this.store.set({ session: await this.connection.ask("observe", params), view: "session" });
+  }
+
+  /** Says where the object is in the session's photograph; of several hints the last one counts. */
+  hint(hint: P.Hint, refused: (error: unknown) => void): void {
+    const session = this.store.now.session?.session;
+    if (session !== undefined) this.hints.call({ session, hint, refused });
+  }
+
+  private async sendHint({ session, hint, refused }: Hinted): Promise<void> {
+    try {
+      const next = await this.connection.ask<P.Session>("hint", { session, hint });
+      if (this.store.now.session?.session === session) this.store.set({ session: next });
+    } catch (error) {
+      if (!this.hints.waiting) refused(error);
+    }
+  }
+
+  /** True until the session has the last hint. */
+  get isHinting(): boolean {
+    return this.hints.busy;
   }
 
   /** Gives the session a photograph; its other data stay. */
@@ -180,6 +215,7 @@ export class Actions {
 
   /** Starts a run of the session's program. */
   async run(settings: P.Settings): Promise<void> {
+    await this.hints.rest;
     const session = this.store.now.session;
     if (!session) return;
     const run = await this.connection.ask<P.Run>("run", { session: session.session, settings });

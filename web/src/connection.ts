@@ -144,6 +144,8 @@ function uploadError(status: number, text: string): Refusal {
 /** Runs a task one at a time; of the calls made meanwhile only the last one is run: what keeps
  * dragging smooth however slow the program answers. */
 export class Latest<A> {
+  /** Resolved when nothing is left to do. */
+  rest: Promise<void> = Promise.resolve();
   private running = false;
   private next: { request: A } | null = null;
 
@@ -152,10 +154,20 @@ export class Latest<A> {
     private readonly onError: (error: unknown) => void = () => {},
   ) {}
 
+  /** True while a request is worked on or waits. */
+  get busy(): boolean {
+    return this.running;
+  }
+
+  /** True if a request waits that is newer than the one worked on. */
+  get waiting(): boolean {
+    return this.next !== null;
+  }
+
   /** Asks for the task with a new request. */
   call(request: A): void {
     this.next = { request };
-    if (!this.running) void this.work();
+    if (!this.running) this.rest = this.work();
   }
 
   private async work(): Promise<void> {

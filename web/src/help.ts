@@ -11,6 +11,7 @@ const KEYS: [string, string][] = [
   ["Alt-R", "start a run"],
   ["Arrow keys", "in the trace: choose; on a slider: change; in 3D: turn"],
   ["+ and −", "in 3D: nearer and further"],
+  ["Arrows, Space, Esc", "on the photograph with a tool: move, press, give up"],
   ["Tab", "at the prompt: complete"],
   ["Drag a number", "change it; with Shift slowly"],
 ];

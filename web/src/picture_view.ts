@@ -26,6 +26,8 @@ export class PictureView {
   readonly tools: HTMLElement;
   /** The camera of the 3D view, for pictures from there. */
   viewOf3D: () => Camera | null = () => null;
+  /** Called when another layer or viewpoint is chosen. */
+  onLook: () => void = () => {};
 
   private data: ViewerData | null = null;
   private frame = 0;
@@ -33,6 +35,8 @@ export class PictureView {
   private wanted: string;
   private layer: string;
   private viewpoint = "given";
+  /** The layer that is shown again after the photograph alone. */
+  private behind: string | null = null;
   private shown: ImageUrl | null = null;
   private readonly image = h("img", { alt: "", draggable: "false" });
   private readonly empty = h("div", { class: "empty" }, "No picture yet");
@@ -92,11 +96,27 @@ export class PictureView {
     if (this.viewpoint === "view") this.ask(this.frame, true);
   }
 
+  /** True if pictures are seen as in the photograph. */
+  get fromCamera(): boolean {
+    return this.viewpoint === "given";
+  }
+
+  /** Shows the photograph alone, or again the layer that it replaced. */
+  showPhotograph(wanted: boolean): void {
+    if (wanted === (this.behind !== null)) return;
+    const layer = wanted ? "photo" : this.behind!;
+    this.behind = wanted ? this.layer : null;
+    if (wanted) this.viewpoint = this.viewpoints.value = "given";
+    // The layer may have been chosen otherwise meanwhile.
+    if (wanted || this.layer === "photo") this.setLayer(layer);
+  }
+
   /** Chooses the layer. */
   setLayer(layer: string): void {
     this.wanted = this.layer = layer;
     if (this.layers.value !== layer) this.layers.value = layer;
     this.onLayer(layer);
+    this.onLook();
     this.ask(this.frame);
   }
 
@@ -106,6 +126,7 @@ export class PictureView {
     if (viewpoint !== "given" && ["overlay", "photo", "residuals"].includes(this.layer)) {
       this.setLayer("scene");
     } else {
+      this.onLook();
       this.ask(this.frame);
     }
   }

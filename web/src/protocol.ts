@@ -36,14 +36,26 @@ export interface Folder {
   sessions: number[];
 }
 
+/** A position in a photograph, pixels. */
+export type Point = [number, number];
+
 /** Where the object is, in pixels of the photograph. */
 export interface Hint {
   mask: string | null;
-  outline: [number, number][];
+  outline: Point[];
   box: [number, number, number, number] | null;
-  axis: { foot: [number, number]; top: [number, number]; width: number } | null;
-  at: [number, number][];
-  not: [number, number][];
+  axis: { foot: Point; top: Point; width: number } | null;
+  at: Point[];
+  not: Point[];
+}
+
+/** The place that a hint points out: guesses of its outline, each of some polygons, the best
+ * first. */
+export interface Guess {
+  source: string;
+  score: number;
+  box: [number, number, number, number] | null;
+  outlines: Point[][][];
 }
 
 export interface Session {

@@ -3,6 +3,7 @@
 import type { Actions, View } from "./actions";
 import { button, h, Segments, select } from "./dom";
 import { ErrorBox } from "./errors";
+import { HintLayer } from "./hint_layer";
 import { hasBest } from "./protocol";
 import { StudioData } from "./studio_data";
 import { Viewer } from "./viewer";
@@ -59,6 +60,7 @@ export class ScenePanel {
     this.exports = h("div", { class: "exports" }, edit, exports);
     this.viewer = new Viewer(this.views.element);
     this.viewer.onFrame = (at) => store.set({ at });
+    new HintLayer(actions, this.viewer.pictures);
     this.element = h("div", { class: "scene" }, this.note, this.viewer.element, this.error.element);
     this.viewer.element.querySelector(".viewer-head")!.append(this.exports);
     const keys = ["session", "runs", "run", "draws", "modes", "view", "at", "connected"] as const;

@@ -50,11 +50,11 @@ export class Viewer {
   readonly element: HTMLElement;
   /** Called when the user moved the slider. */
   onFrame: (frame: number) => void = () => {};
+  readonly pictures = new PictureView();
 
   private data: ViewerData | null = null;
   private frame = 0;
   private playing: ReturnType<typeof setTimeout> | null = null;
-  private readonly pictures = new PictureView();
   private readonly space = new SpaceView();
   private readonly panes: HTMLElement;
   private readonly layout: Segments;

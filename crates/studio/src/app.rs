@@ -2,6 +2,8 @@
 //! the runs of `pcadlang run`.
 
 use super::folder::Folder;
+use super::guess;
+use super::hint::HintJson;
 use super::protocol::{self, Call, StateName, Viewpoint};
 use super::results::{self, finite};
 use super::runs::Runs;
@@ -14,6 +16,7 @@ use pcadlang_library::scene::ImageValue;
 use pcadlang_report::embedded;
 use pcadlang_report::pictures::png;
 use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::hint::HintArgs;
 use pcadlang_runs::reopening::reopened::Reopened;
 use pcadlang_runs::scene;
 use pcadlang_runs::{files, inputs};
@@ -69,11 +72,12 @@ impl App {
                 self.change(o.session, move |open| open.observe(o.observe, Stop::default()))?
             }
             Call::Hint(h) => {
-                if let Some(mask) = &h.hint.mask {
-                    self.folder.file(&mask.to_string_lossy())?;
-                }
-                let hint = h.hint.arguments();
+                let hint = self.hinted(h.hint)?;
                 self.change(h.session, move |open| open.hint(hint, Stop::default()))?
+            }
+            Call::Guess(g) => {
+                let photo = self.sessions.get(g.session)?.photo();
+                guess::of(photo.as_ref(), &self.hinted(g.hint)?.read()?, g.quick)?
             }
             Call::Enter(e) => self.enter(e.session, e.text)?,
             Call::Interrupt(i) => {
@@ -135,6 +139,15 @@ impl App {
     /// Checks that observed files are of the opened folder.
     fn permit(&self, observe: &[String]) -> Result<(), Failure> {
         observe.iter().try_for_each(|spec| self.folder.file(inputs::file_of(spec)).map(|_| ()))
+    }
+
+    /// Returns the arguments of a command that give a hint, whose mask must be of the opened
+    /// folder.
+    fn hinted(&self, hint: HintJson) -> Result<HintArgs, Failure> {
+        if let Some(mask) = &hint.mask {
+            self.folder.file(&mask.to_string_lossy())?;
+        }
+        Ok(hint.arguments())
     }
 
     /// Sends an event to every page.

@@ -11,6 +11,7 @@ mod app;
 mod args;
 mod folder;
 mod guard;
+mod guess;
 mod hint;
 mod language;
 mod listener;

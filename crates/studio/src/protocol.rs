@@ -133,6 +133,8 @@ methods! {
     Observe = "observe" { session: u64, observe: Vec<String> }
     /// Says where the object is in a session's photograph.
     Hint = "hint" { session: u64, hint: HintJson }
+    /// The place that a hint points out in a session's photograph, which stays as it is.
+    Guess = "guess" { session: u64, hint: HintJson, #[serde(default)] quick: bool }
     /// An entry of the prompt.
     Enter = "enter" { session: u64, text: String }
     /// Stops what a session is doing.

@@ -5,6 +5,7 @@ use super::folder::is_picture;
 use super::hint::HintJson;
 use super::results::finite;
 use pcadlang_engine::lang::reach::path_within;
+use pcadlang_engine::lang::value::Value as Image;
 use pcadlang_engine::trace::Stop;
 use pcadlang_library::Program;
 use pcadlang_library::scene::ImageValue;
@@ -29,6 +30,9 @@ const MOST: usize = 64;
 /// Something to do with a session.
 type Work = Box<dyn FnOnce(&mut OpenSession) + Send>;
 
+/// The image that a session observes.
+type Shown = Arc<Mutex<Option<Image>>>;
+
 /// The open sessions.
 #[derive(Default)]
 pub struct Sessions {
@@ -43,6 +47,8 @@ pub struct Handle {
     /// Set to stop what it is doing.
     stop: Arc<AtomicBool>,
     work: Sender<Work>,
+    /// Its photograph, to look at while it is busy.
+    photo: Shown,
 }
 
 /// A session, on its thread.
@@ -84,6 +90,8 @@ impl Sessions {
         let (work, todo) = channel::<Work>();
         let (told, opened) = channel();
         let asked = Arc::clone(&stop);
+        let photo = Shown::default();
+        let shown = Arc::clone(&photo);
         let thread = std::thread::Builder::new().name(format!("session {id}"));
         let begun = thread.spawn(move || {
             // A session is not sent between threads, so it is opened on its own.
@@ -93,6 +101,7 @@ impl Sessions {
                 Ok(Err(problem)) => return told.send(Err(problem)).unwrap_or_default(),
                 Err(_) => return told.send(Err(internal())).unwrap_or_default(),
             };
+            open.show(&shown);
             let _ = told.send(Ok(()));
             for work in todo {
                 work(&mut open);
@@ -100,7 +109,7 @@ impl Sessions {
         });
         begun.map_err(|e| plain(format!("no thread can be started: {e}")))?;
         opened.recv().unwrap_or_else(|_| Err(internal()))?;
-        let handle = Arc::new(Handle { id, stop, work });
+        let handle = Arc::new(Handle { id, stop, work, photo });
         // Not locked while the program is compiled: the other sessions go on meanwhile.
         let mut all = self.all.lock().unwrap_or_else(PoisonError::into_inner);
         all.insert(id, Arc::clone(&handle));
@@ -139,15 +148,21 @@ impl Handle {
         f: impl FnOnce(&mut OpenSession) -> Result<T, Failure> + Send + 'static,
     ) -> Result<T, Failure> {
         let (told, done) = channel();
-        let stop = Arc::clone(&self.stop);
+        let (stop, shown) = (Arc::clone(&self.stop), Arc::clone(&self.photo));
         let work: Work = Box::new(move |open| {
             stop.store(false, Ordering::SeqCst);
             let done =
                 catch_unwind(AssertUnwindSafe(|| f(open))).unwrap_or_else(|_| Err(internal()));
+            open.show(&shown);
             let _ = told.send(done);
         });
         self.work.send(work).map_err(|_| plain("the session was closed"))?;
         done.recv().unwrap_or_else(|_| Err(plain("the session was closed")))
+    }
+
+    /// Returns the image that it observes, without waiting for what it is doing.
+    pub fn photo(&self) -> Option<Image> {
+        self.photo.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Stops what the session is doing.
@@ -179,6 +194,12 @@ impl OpenSession {
         let (mut session, said) = Session::open(program, job.sampling.seed, stop)?;
         session.confine(Path::new("."));
         Ok(OpenSession { session, job, note: said.text, missing })
+    }
+
+    /// Shows the image that it observes.
+    fn show(&self, to: &Shown) {
+        let mut shown = to.lock().unwrap_or_else(PoisonError::into_inner);
+        *shown = observed_image(self.session.model().code());
     }
 
     /// Gives the program other data, without a hint, which was about the old photograph.

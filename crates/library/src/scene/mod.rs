@@ -20,6 +20,7 @@ mod objects;
 mod observed;
 mod people;
 pub mod places;
+mod pointed_out;
 mod region;
 mod scene_view;
 mod seeing;

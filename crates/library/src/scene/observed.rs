@@ -4,7 +4,7 @@
 //! cached with it.
 
 use super::places::{self, Place};
-use super::{IMAGE, found_objects, native, people};
+use super::{IMAGE, native, people};
 use pcadlang_detectors::people::Person;
 use pcadlang_engine::lang::builtins::{Domain, Row, Type, arg, int, num, opt};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
@@ -139,8 +139,13 @@ impl ImageValue {
     /// Returns the people that programs detected in it, in the order of its hint, the most
     /// prominent first; `None` if no program did.
     pub fn people(&self) -> Option<Vec<Person>> {
+        self.people_by(&self.hint)
+    }
+
+    /// The same in the order of another hint.
+    pub(super) fn people_by(&self, hint: &Hint) -> Option<Vec<Person>> {
         let all = self.prepared().first::<PeopleKey, Vec<(Person, Value)>>()?;
-        let order = people::order(&all, &self.hint, self.size());
+        let order = people::order(&all, hint, self.size());
         Some(order.into_iter().map(|i| all[i].0.clone()).collect())
     }
 
@@ -155,7 +160,7 @@ impl ImageValue {
         hint: &Hint,
     ) -> Result<Arc<Vec<Place>>, Fault> {
         self.prepared().get((*options, hint.clone()), |(options, hint)| match self.as_photo() {
-            Some(photo) => Ok(places::places(photo, &*found_objects::found(self)?, hint, options)),
+            Some(photo) => places::places(self, photo, hint, options),
             None => Ok(places::regions(&enclosed(self.map()?, options), 1.0)),
         })
     }

@@ -1,11 +1,14 @@
 //! Places in a photograph where an object of revolution may be: where the user points, in
 //! the boxes of a detector, or in regions that are nearly mirror-symmetric.
 
+use super::{ImageValue, found_objects};
 use pcadlang_detectors::boxes::overlap;
 use pcadlang_detectors::objects::FoundObject;
+use pcadlang_engine::lang::error::Fault;
 use pcadlang_scene::vision::candidates::{Axis, Candidate, CandidateOptions, candidates};
 use pcadlang_scene::vision::segmentation::{Guess, Method, from_mask, guesses};
 use pcadlang_scene::vision::{Hint, Mask, Photo};
+use std::sync::Arc;
 
 /// The classes of COCO that are objects of revolution.
 const ROUND: [&str; 7] = ["bottle", "wine glass", "cup", "bowl", "apple", "orange", "vase"];
@@ -19,9 +22,6 @@ const SAME: f64 = 0.75;
 const REGIONS: f64 = 0.1;
 /// Each side of the picture that a box touches multiplies its weight by this.
 const CUT_OFF: f64 = 0.6;
-
-/// The standard deviation of a click about the middle of a box, in widths and heights.
-const CLICKED: f64 = 0.2;
 
 /// A place where an object may be.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,7 +40,12 @@ pub struct Place {
 }
 
 impl Place {
-    fn guessed(source: &str, score: f64, bounds: Option<[f64; 4]>, all: &[Guess]) -> Place {
+    pub(super) fn guessed(
+        source: &str,
+        score: f64,
+        bounds: Option<[f64; 4]>,
+        all: &[Guess],
+    ) -> Place {
         let first = |method| all.iter().find(|g| g.method == method).map(|g| g.mask.clone());
         let masks = [Method::Symmetric, Method::Cut].into_iter().filter_map(first).collect();
         // Each method has the same weight; later guesses and axes of one have half the
@@ -58,10 +63,19 @@ impl Place {
         Place { masks: vec![c.mask.clone()], axes: normalised(axes), ..Place::anywhere(score) }
     }
 
+    /// A place with outlines, and no axes yet.
+    pub(super) fn outlined(
+        source: &str,
+        score: f64,
+        bounds: Option<[f64; 4]>,
+        masks: Vec<Mask>,
+    ) -> Place {
+        Place { score, source: source.into(), bounds, masks, axes: Vec::new() }
+    }
+
     /// A place that nothing points to.
     pub(super) fn anywhere(score: f64) -> Place {
-        let (source, bounds, masks, axes) = ("region".into(), None, Vec::new(), Vec::new());
-        Place { score, source, bounds, masks, axes }
+        Place::outlined("region", score, None, Vec::new())
     }
 }
 
@@ -71,54 +85,78 @@ fn normalised(mut axes: Vec<(Axis, f64)>) -> Vec<(Axis, f64)> {
     axes
 }
 
-/// Returns the places of a photograph that a hint leaves open, the most probable first.
+impl ImageValue {
+    /// Returns guesses by all methods for a hint with a box or an axis.
+    pub(super) fn guesses(&self, photo: &Photo, hint: &Hint) -> Result<Arc<Vec<Guess>>, Fault> {
+        self.prepared().get(hint.clone(), |hint| Ok(guesses(photo, hint, &Method::ALL)))
+    }
+
+    fn regions(
+        &self,
+        photo: &Photo,
+        options: &CandidateOptions,
+    ) -> Result<Arc<Vec<Candidate>>, Fault> {
+        self.prepared().get(*options, |options| Ok(candidates(photo, options)))
+    }
+}
+
+/// Returns the places of an image's photograph that a hint leaves open, the most probable
+/// first.
+///
+/// # Errors
+/// Those of the detector.
 pub(super) fn places(
+    image: &ImageValue,
     photo: &Photo,
-    objects: &[FoundObject],
     hint: &Hint,
     options: &CandidateOptions,
-) -> Vec<Place> {
+) -> Result<Vec<Place>, Fault> {
     if let Some(mask) = hint.drawn(photo.width(), photo.height()) {
         let axes = from_mask(photo, &mask).into_iter().zip([0.8, 0.2]).collect();
-        let (source, bounds) = ("drawn".into(), None);
-        let masks = vec![mask];
-        return vec![Place { score: 1.0, source, bounds, masks, axes: normalised(axes) }];
+        let drawn = Place::outlined("drawn", 1.0, None, vec![mask]);
+        return Ok(vec![Place { axes: normalised(axes), ..drawn }]);
     }
     if hint.axis.is_some() || hint.bounds.is_some() {
         let source = if hint.axis.is_some() { "axis" } else { "box" };
-        return vec![Place::guessed(source, 1.0, hint.bounds, &guesses(photo, hint, &Method::ALL))];
+        let all = image.guesses(photo, hint)?;
+        return Ok(vec![Place::guessed(source, 1.0, hint.bounds, &all)]);
     }
-    let boxes = boxes(photo, objects, hint);
+    let boxes = boxes(photo, &found_objects::found(image)?, hint);
     let seen = boxes.iter().map(|(o, weight)| {
-        let [l, t, r, b] = o.bounds;
-        let bounds = Some([l, t, r - l, b - t]);
-        let all = guesses(photo, &Hint { bounds, ..hint.clone() }, &Method::ALL);
-        Place::guessed(o.class, *weight, bounds, &all)
+        let bounds = Some(sized(o.bounds));
+        let all = image.guesses(photo, &Hint { bounds, ..hint.clone() })?;
+        Ok(Place::guessed(o.class, *weight, bounds, &all))
     });
-    let mut all: Vec<Place> = seen.collect();
-    let unseen = REGIONS;
+    let mut all: Vec<Place> = seen.collect::<Result<_, Fault>>()?;
     let seen = all.iter().map(|p| p.score).sum::<f64>();
-    let share = unseen / (unseen + seen);
-    all.iter_mut().for_each(|p| p.score /= unseen + seen);
-    if share > 0.0 {
-        all.extend(regions(&meant(candidates(photo, options), photo, hint), share));
-    }
-    all
+    let share = match (all.is_empty(), hint.at.is_empty()) {
+        (true, _) => 1.0,
+        (false, true) => REGIONS / (REGIONS + seen),
+        (false, false) => REGIONS,
+    };
+    all.iter_mut().for_each(|p| p.score *= (1.0 - share) / seen);
+    all.extend(regions(&meant(image.regions(photo, options)?.to_vec(), photo, hint), share));
+    Ok(all)
+}
+
+/// Returns left, top, width and height of a box of left, top, right and bottom.
+pub(super) fn sized([left, top, right, bottom]: [f64; 4]) -> [f64; 4] {
+    [left, top, right - left, bottom - top]
 }
 
 /// A box where the detector sees a vessel or a fruit, of whatever class: the mean of boxes
 /// that overlap, weighted by the squares of their scores.
-struct Seen {
+pub(super) struct Seen {
     /// The class with the highest score.
-    class: &'static str,
-    bounds: [f64; 4],
+    pub class: &'static str,
+    pub bounds: [f64; 4],
     /// The sum of the scores, and of their squares.
     score: f64,
     sure: f64,
 }
 
 /// Returns the boxes that may be meant, with their weights, the best first.
-fn boxes(photo: &Photo, objects: &[FoundObject], hint: &Hint) -> Vec<(Seen, f64)> {
+pub(super) fn boxes(photo: &Photo, objects: &[FoundObject], hint: &Hint) -> Vec<(Seen, f64)> {
     let clicked = !hint.at.is_empty();
     let round = |o: &&FoundObject| o.score >= LEAST && ROUND.contains(&o.name());
     let inside =
@@ -130,18 +168,11 @@ fn boxes(photo: &Photo, objects: &[FoundObject], hint: &Hint) -> Vec<(Seen, f64)
     let (width, height) = (f64::from(photo.width()), f64::from(photo.height()));
     let weight = |o: &Seen| {
         let [l, t, r, b] = o.bounds;
-        let middle = [0.5 * (l + r), 0.5 * (t + b)];
-        // People click near the middle of a thing, and photograph it in the middle.
-        let central = if clicked {
-            let off = |[x, y]: &[f64; 2]| {
-                ((x - middle[0]) / (r - l)).powi(2) + ((y - middle[1]) / (b - t)).powi(2)
-            };
-            let off = hint.at.iter().map(off).sum::<f64>() / hint.at.len() as f64;
-            libm::exp(-off / (2.0 * CLICKED * CLICKED))
-        } else {
-            let off = [middle[0] / width - 0.5, middle[1] / height - 0.5];
-            libm::exp(-2.0 * (off[0] * off[0] + off[1] * off[1]))
-        };
+        if clicked {
+            return o.score * clicks(o.bounds, &hint.at);
+        }
+        let off = [0.5 * (l + r) / width - 0.5, 0.5 * (t + b) / height - 0.5];
+        let central = libm::exp(-2.0 * (off[0] * off[0] + off[1] * off[1]));
         let area = (r - l) * (b - t) / (width * height);
         let touched = [l < 0.01 * width, t < 0.01 * height, r > 0.99 * width, b > 0.99 * height];
         let cut_off = touched.into_iter().filter(|t| *t).map(|_| CUT_OFF).product::<f64>();
@@ -169,6 +200,17 @@ fn boxes(photo: &Photo, objects: &[FoundObject], hint: &Hint) -> Vec<(Seen, f64)
     all.sort_by(|a, b| b.1.total_cmp(&a.1));
     all.truncate(BOXES);
     all
+}
+
+/// Returns the density of clicks on the object in a box of left, top, right and bottom: about its
+/// middle, with a standard deviation of a quarter of each side, so that what lies before a large
+/// thing is meant rather than that. Several clicks, which are not independent, count as one.
+fn clicks([l, t, r, b]: [f64; 4], at: &[[f64; 2]]) -> f64 {
+    let (middle, half) =
+        ([0.5 * (l + r), 0.5 * (t + b)], [r - l, b - t].map(|s| f64::max(0.5 * s, 0.5)));
+    let off = |p: &[f64; 2]| [0, 1].map(|c| (p[c] - middle[c]) / half[c]);
+    let far = at.iter().map(off).map(|[x, y]| x * x + y * y).sum::<f64>() / at.len() as f64;
+    libm::exp(-2.0 * far) / (half[0] * half[1])
 }
 
 /// Returns regions as places, the weights of which add up to `share`.

@@ -18,6 +18,7 @@ pub mod features;
 pub mod hint;
 pub mod keypoints;
 pub mod mask;
+mod mask_outlines;
 pub mod pictures;
 pub mod region;
 pub mod segmentation;
