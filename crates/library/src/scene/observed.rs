@@ -161,7 +161,11 @@ impl ImageValue {
     ) -> Result<Arc<Vec<Place>>, Fault> {
         self.prepared().get((*options, hint.clone()), |(options, hint)| match self.as_photo() {
             Some(photo) => places::places(self, photo, hint, options),
-            None => Ok(places::regions(&enclosed(self.map()?, options), 1.0)),
+            None => {
+                let mut all = places::regions(&enclosed(self.map()?, options));
+                places::normalise(&mut all);
+                Ok(all)
+            }
         })
     }
 
