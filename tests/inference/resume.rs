@@ -121,6 +121,7 @@ fn shipped_programs() {
 fn shipped_programs_of_pictures() {
     for (name, data, file) in [
         ("lathe.pcad", "photo", "coffee_cup.png"),
+        ("table.pcad", "photo", "coffee_cup.png"),
         ("human.pcad", "photo", "skier.jpg"),
         ("two_people.pcad", "photo", "skier.jpg"),
     ] {

@@ -84,6 +84,11 @@ fn shipped_lathe_parts() {
 }
 
 #[test]
+fn shipped_table() {
+    same_of_picture("table.pcad", Some(48), &[CUP], 40, 40);
+}
+
+#[test]
 fn shipped_human() {
     same_of_picture("human.pcad", Some(48), &[SKIER], 60, 60);
 }
