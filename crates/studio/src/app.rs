@@ -3,7 +3,7 @@
 
 use super::folder::Folder;
 use super::guess;
-use super::hint::HintJson;
+use super::protocol::HintJson;
 use super::protocol::{self, Call, StateName, Viewpoint};
 use super::results::{self, finite};
 use super::runs::Runs;

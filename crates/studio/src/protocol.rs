@@ -1,12 +1,12 @@
 //! The frames that the page and the studio exchange (`docs/reference/studio.md`): requests
 //! are parsed, answers are written. Nothing here does what is asked.
 
-use super::hint::HintJson;
 use pcadlang_syntax::diag::nearest;
-use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// A request.
 #[derive(Debug)]
@@ -253,6 +253,37 @@ pub fn binary(id: u64, mut header: Map<String, Value>, data: &[u8]) -> Vec<u8> {
     frame.extend_from_slice(header.as_bytes());
     frame.extend_from_slice(data);
     frame
+}
+
+/// Where the object is in the photograph, pixels; everything is optional.
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HintJson {
+    /// The file of a mask, in the opened folder.
+    pub mask: Option<PathBuf>,
+    /// The corners of an outline.
+    pub outline: Vec<[f64; 2]>,
+    /// Left, top, width and height.
+    #[serde(rename = "box")]
+    pub bounds: Option<[f64; 4]>,
+    /// The object's axis.
+    pub axis: Option<AxisJson>,
+    /// Positions on the object.
+    pub at: Vec<[f64; 2]>,
+    /// Positions beside it.
+    pub not: Vec<[f64; 2]>,
+}
+
+/// An axis, pixels.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct AxisJson {
+    /// The end on which the object stands.
+    pub foot: [f64; 2],
+    /// The other end.
+    pub top: [f64; 2],
+    /// The width across it.
+    pub width: f64,
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! is done in turn.
 
 use super::folder::is_picture;
-use super::hint::HintJson;
+use super::protocol::HintJson;
 use super::results::finite;
 use pcadlang_engine::lang::reach::path_within;
 use pcadlang_engine::lang::value::Value as Image;
