@@ -122,6 +122,8 @@ fn starts_of_the_lathe_are_seen_in_perspective() {
         "starts.pcad",
         "--observe",
         "cup/mask.png",
+        "--mask",
+        "cup/mask.png",
         "--chains",
         "100",
         "--quiet",

@@ -13,7 +13,8 @@
 //! of the command runs each case.
 //!
 //! Prints for each case the median intersection over union of the fitted and the true mask
-//! over the seeds, and whether the top is towards (+) or away from the camera (-) in each;
+//! over the seeds, whether the top is towards (+) or away from the camera (-) in each, and
+//! what the run says about having found it (with its fit, the overlap of outlines, and of chains);
 //! then the mean and the median of the cases and how many reach 0.8.
 
 use pcadlang_library::scene::ImageValue;
@@ -215,7 +216,7 @@ fn hint(kind: &str, case: &Case) -> Result<Vec<String>, String> {
 }
 
 /// Runs a case, and returns the overlap and the component of the axis towards the camera.
-fn run(s: &Settings, kind: &str, case: &Case, seed: u64) -> Result<(f64, f64), String> {
+fn run(s: &Settings, kind: &str, case: &Case, seed: u64) -> Result<(f64, f64, String), String> {
     let binary = std::env::current_exe().map_err(|e| e.to_string())?.with_file_name("pcadlang");
     let out = s.out.join(format!("{kind}-{seed}")).join(&case.name);
     let sets = s.sets.iter().flat_map(|set| ["--set".to_owned(), set.clone()]);
@@ -234,7 +235,7 @@ fn run(s: &Settings, kind: &str, case: &Case, seed: u64) -> Result<(f64, f64), S
         return Err(format!("{}: {}", case.name, String::from_utf8_lossy(&ran.stderr)));
     }
     let fit = read_mask(&out.join("mask.png"))?.resized(case.mask.width(), case.mask.height());
-    Ok((overlap(&fit, &case.mask), toward(&out).unwrap_or(0.0)))
+    Ok((overlap(&fit, &case.mask), toward(&out).unwrap_or(0.0), judged(&out).unwrap_or_default()))
 }
 
 /// The axis of the best state towards the camera.
@@ -244,6 +245,16 @@ fn toward(out: &Path) -> Option<f64> {
     let choices = trace["choices"].as_array()?;
     let tilt = choices.iter().find(|c| c["address"] == "@S_L/place/r[x]")?;
     tilt["value"].as_f64()
+}
+
+/// What the run says about having found the object.
+fn judged(out: &Path) -> Option<String> {
+    let text = std::fs::read_to_string(out.join("run.json")).ok()?;
+    let found = serde_json::from_str::<serde_json::Value>(&text).ok()?["found"].clone();
+    let number = |name: &str| found[name].as_f64().unwrap_or(f64::NAN);
+    let [fit, outlines, chains] = ["fit", "outlines", "chains"].map(number);
+    let verdict = found["verdict"].as_str()?;
+    Some(format!("{verdict} ({fit:.2} {outlines:.2} {chains:.2})"))
 }
 
 fn median(values: &mut [f64]) -> f64 {
@@ -300,11 +311,13 @@ fn main() -> Result<(), String> {
             let runs = s.seeds.iter().map(|seed| run(&s, kind, case, *seed));
             let runs = runs.collect::<Result<Vec<_>, String>>()?;
             let signs: String =
-                runs.iter().map(|(_, t)| if *t > 0.0 { '+' } else { '-' }).collect();
-            let mut overlaps: Vec<f64> = runs.iter().map(|(overlap, _)| *overlap).collect();
+                runs.iter().map(|(_, t, _)| if *t > 0.0 { '+' } else { '-' }).collect();
+            let mut overlaps: Vec<f64> = runs.iter().map(|(overlap, ..)| *overlap).collect();
             let shown: Vec<String> = overlaps.iter().map(|v| format!("{v:.2}")).collect();
             let middle = median(&mut overlaps);
-            println!("{kind:8} {:28} {middle:.3}  {}  {signs}", case.name, shown.join(" "));
+            let said: Vec<&str> = runs.iter().map(|(.., said)| said.as_str()).collect();
+            let (shown, said) = (shown.join(" "), said.join(", "));
+            println!("{kind:8} {:28} {middle:.3}  {shown}  {signs}  {said}", case.name);
             medians.push(middle);
         }
         let found = medians.iter().filter(|v| **v >= 0.8).count();

@@ -7,6 +7,7 @@ use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::files::write_in;
 use pcadlang_runs::job::{self, Interrupt, Outcome, RunMode};
 use pcadlang_runs::print::paragraph;
+use pcadlang_runs::verdict::Judgement;
 use pcadlang_runs::{inputs, quality, resume};
 use serde_json::json;
 use std::path::Path;
@@ -63,6 +64,7 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explan
             "out": dir.path(), "seed": seed, "quantities": all, "kernels": o.kernels, "choices": o.sites,
             "modes": o.modes,
             "warnings": o.warnings,
+            "found": o.judged.as_ref().map(Judgement::json),
             "approximate": o.approximate,
         });
         if let Some(explained) = explained {
@@ -73,6 +75,9 @@ fn show(a: &Run, job: &Job, dir: &RunDir, o: &Outcome, explained: Option<&Explan
     }
     if a.quiet || a.stream {
         return;
+    }
+    if let Some(judged) = &o.judged {
+        paragraph(&format!("{judged}\n"));
     }
     let modes = modes_table(&o.modes, &o.quantities);
     let gap = if modes.is_empty() { "" } else { "\n" };

@@ -19,7 +19,7 @@ use pcadlang_report::RunDir;
 use pcadlang_report::pictures::{self, png};
 use pcadlang_scene::geom::{Mesh, Solid, glb, obj};
 use pcadlang_scene::render::{Camera, View};
-use pcadlang_scene::vision::{Photo, npy};
+use pcadlang_scene::vision::{Mask, Photo, npy};
 use pcadlang_workbench::session::{detected, exported, exported_operand, over};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -34,6 +34,8 @@ pub struct Shown {
     pub view: Option<ViewValue>,
     /// Its joints beside those that were found in the photograph.
     pub located: Vec<Located>,
+    /// Its pixels, at the size of the photograph.
+    pub mask: Option<Mask>,
     /// The fraction of the mesh's vertices that are in the picture.
     pub inside: Option<f64>,
     /// How far the chains' last states cover the same pixels: the number of pixels that
@@ -105,6 +107,7 @@ fn draw(
     write_in(dir, "depth.npy", &npy::f32_array(&shape, frame.depth.iter().copied()))?;
     let normals = npy::f32_array(&[shape[0], shape[1], 3], frame.normal.iter().flatten().copied());
     write_in(dir, "normals.npy", &normals)?;
+    shown.mask = Mask::new(frame.width, frame.height, frame.mask().collect()).ok();
     let bytes = frame.mask().map(|m| if m { 255 } else { 0 }).collect();
     let encode = |p: Result<Vec<u8>, image::ImageError>| p.map_err(|e| plain(e.to_string()));
     if let Some(mask) = GrayImage::from_raw(frame.width, frame.height, bytes) {

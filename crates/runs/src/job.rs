@@ -19,6 +19,7 @@ use crate::reopening::page::write_page;
 use crate::reopening::reopened::{PROGRAM, TRACES, TRAJECTORY, arguments};
 use crate::reopening::{reopened, seen};
 use crate::stream::Streamed;
+use crate::verdict::Judgement;
 use crate::watched::Watched;
 use crate::{files, inputs};
 use pcadlang_inference::RunOptions;
@@ -26,6 +27,7 @@ use pcadlang_inference::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang_inference::{
     BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Trajectory,
 };
+use pcadlang_library::scene::ImageValue;
 use pcadlang_library::{Model, Started};
 use pcadlang_report::{
     ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, modes, quantities,
@@ -41,6 +43,8 @@ use std::time::Duration;
 
 /// The results of a run.
 pub struct Outcome {
+    /// Whether the object of the photograph was found, where the program asks for places.
+    pub judged: Option<Judgement>,
     /// Every recorded quantity.
     pub quantities: Vec<Quantity>,
     /// Statistics of the kernels, over all chains.
@@ -393,7 +397,12 @@ impl Fill<'_> {
         show_places(dir, seed, &ready.model, &places, ready.photo())?;
         let log_joint = best.as_ref().map_or(f64::NAN, |b| b.log_joint);
         write_scene(dir, seed, ready, (log_joint, &drawn), &watched.kept.all())?;
-        warnings.extend(disagreement(&drawn));
+        let places = ready.image().and_then(ImageValue::known_places);
+        let judged = drawn.mask.as_ref().zip(places);
+        let judged = judged.and_then(|(mask, all)| Judgement::of(mask, &all, drawn.agreement));
+        if judged.is_none() {
+            warnings.extend(disagreement(&drawn));
+        }
         warnings.extend(outside(&drawn));
         let seconds = ready.begun.elapsed().as_secs_f64();
         if let Some(found) =
@@ -408,7 +417,9 @@ impl Fill<'_> {
         }
         let mut more = counts(&chains, best.as_deref(), &quantities);
         more.extend(drawn.agreement.map(|a| ("agreement".into(), json!(a))));
+        more.extend(judged.as_ref().map(|j| ("found".into(), j.json())));
         let outcome = Outcome {
+            judged,
             approximate: approximate(job, &chains),
             every: draws.iter().map(|d| d.every).max().unwrap_or(1),
             quantities,

@@ -25,6 +25,7 @@ pub mod resume;
 pub mod scene;
 pub mod stream;
 pub mod term;
+pub mod verdict;
 pub mod watched;
 
 pub use pcadlang_workbench::failure;

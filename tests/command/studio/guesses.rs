@@ -65,7 +65,10 @@ fn a_click_is_answered_with_what_is_seen_there() {
         assert!(is_inside(&place, [150.0, 110.0]), "{place}");
     }
     // Where no object is left, regions are searched, but not quickly.
-    let hint = json!({ "not": [[155.0, 75.0]] });
+    let beside: Vec<[f64; 2]> = (0..40)
+        .flat_map(|i| (0..26).map(move |j| [8.0 * f64::from(i), 8.0 * f64::from(j)]))
+        .collect();
+    let hint = json!({ "not": beside });
     assert!(guess(&mut page, hint.clone(), true).is_null());
     assert_eq!(guess(&mut page, hint, false)["source"], "region");
 }

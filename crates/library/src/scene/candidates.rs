@@ -63,13 +63,16 @@ pub(super) const TABLE: &[Row] = &[native(
         };
         let camera = camera(a, (width, height))?;
         let options = CandidateOptions { most: a.int("most")? as usize, size };
-        let found = image.places(&options, &*asked(a, image)?);
-        let found: Arc<Vec<Place>> = found.map_err(|f| f.of("scene.candidates"))?;
-        let scale = [
-            f64::from(camera.width) / f64::from(width.max(1)),
-            f64::from(camera.height) / f64::from(height.max(1)),
-        ];
-        Ok(Value::List(found.iter().map(|p| value(p, &camera, scale)).collect()))
+        let key = (options, asked(a, image)?.into_owned(), camera);
+        let all = image.prepared().get(key, |(options, hint, camera)| {
+            let found = image.places(options, hint).map_err(|f| f.of("scene.candidates"))?;
+            let scale = [
+                f64::from(camera.width) / f64::from(width.max(1)),
+                f64::from(camera.height) / f64::from(height.max(1)),
+            ];
+            Ok(Value::List(found.iter().map(|p| value(p, camera, scale)).collect()))
+        })?;
+        Ok(Value::clone(&all))
     },
 )];
 

@@ -61,6 +61,13 @@ impl Prepared {
         item.get_or_init(|| make(&key).map(Arc::new)).clone()
     }
 
+    /// Returns the newest item of a type whose key fulfils a condition, if it was made.
+    pub fn known<K: 'static, T: 'static>(&self, is: impl Fn(&K) -> bool) -> Option<Arc<T>> {
+        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut items = all.iter().rev().filter_map(|i| i.downcast_ref::<Item<K, T>>());
+        items.find(|i| is(&i.0))?.1.get()?.clone().ok()
+    }
+
     /// Returns the item of a type that was made first.
     pub fn first<K: 'static, T: 'static>(&self) -> Option<Arc<T>> {
         let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -167,6 +174,11 @@ impl ImageValue {
                 Ok(all)
             }
         })
+    }
+
+    /// Returns the places that programs searched with its hint; `None` if none did.
+    pub fn known_places(&self) -> Option<Arc<Vec<Place>>> {
+        self.prepared().known(|(_, hint): &(CandidateOptions, Hint)| *hint == self.hint)
     }
 
     /// Returns its contours, detecting them if necessary.
