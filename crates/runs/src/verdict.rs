@@ -136,7 +136,7 @@ mod tests {
         assert_eq!(judge(&[]), None);
         assert_eq!(judge(&[place("region", vec![])]), None);
         let other = place("bowl", vec![columns(12, 20)]);
-        assert_eq!(judge(&[other.clone()]), Some(Verdict::NotFound));
+        assert_eq!(judge(std::slice::from_ref(&other)), Some(Verdict::NotFound));
         let cup = place("cup", vec![columns(0, 9), columns(0, 10)]);
         assert_eq!(judge(&[other, cup]), Some(Verdict::Found));
         assert_eq!(judge(&[place("cup", vec![columns(0, 14)])]), Some(Verdict::Perhaps));

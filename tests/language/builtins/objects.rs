@@ -11,7 +11,7 @@ fn skier() -> Value {
 }
 
 fn words(all: &[&str]) -> Value {
-    Value::List(all.iter().map(|w| Value::str(*w)).collect())
+    Value::List(all.iter().map(|w| Value::str(w)).collect())
 }
 
 /// Returns the classes and scores of objects.
@@ -32,7 +32,7 @@ fn objects_have_a_box_a_class_and_a_score() {
     let of = |most: f64, least: f64, classes: Value| {
         call("scene.objects", &[photo.clone(), num(most), num(least), classes])
     };
-    let usual = call("scene.objects", &[photo.clone()]);
+    let usual = call("scene.objects", std::slice::from_ref(&photo));
     let all = described(&usual);
     assert!(all[0].0 == "person" && all[0].1 > 0.8, "{all:?}");
     assert!(all.iter().all(|(_, score)| *score >= 0.3));

@@ -3,13 +3,11 @@
 //! Data that comparators derive from an observation alone are computed on first use and
 //! cached with it.
 
-use super::places::{self, Place};
 use super::{IMAGE, native, people};
 use pcadlang_detectors::people::Person;
 use pcadlang_engine::lang::builtins::{Domain, Row, Type, arg, int, num, opt};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::{Object, Value};
-use pcadlang_scene::vision::candidates::{CandidateOptions, enclosed};
 use pcadlang_scene::vision::{
     ContourDetector, ContourMap, DepthMap, GradientDetector, Hint, Keypoints, MAP_SIZE,
     MOST_MAP_SIZE, Mask, Photo, SoftMap,
@@ -154,31 +152,6 @@ impl ImageValue {
         let all = self.prepared().first::<PeopleKey, Vec<(Person, Value)>>()?;
         let order = people::order(&all, hint, self.size());
         Some(order.into_iter().map(|i| all[i].0.clone()).collect())
-    }
-
-    /// Returns the places where a hint leaves open that an object of revolution may be, the
-    /// most probable first.
-    ///
-    /// # Errors
-    /// If a detector fails.
-    pub fn places(
-        &self,
-        options: &CandidateOptions,
-        hint: &Hint,
-    ) -> Result<Arc<Vec<Place>>, Fault> {
-        self.prepared().get((*options, hint.clone()), |(options, hint)| match self.as_photo() {
-            Some(photo) => places::places(self, photo, hint, options),
-            None => {
-                let mut all = places::regions(&enclosed(self.map()?, options));
-                places::normalise(&mut all);
-                Ok(all)
-            }
-        })
-    }
-
-    /// Returns the places that programs searched with its hint; `None` if none did.
-    pub fn known_places(&self) -> Option<Arc<Vec<Place>>> {
-        self.prepared().known(|(_, hint): &(CandidateOptions, Hint)| *hint == self.hint)
     }
 
     /// Returns its contours, detecting them if necessary.

@@ -5,7 +5,7 @@ use super::{ImageValue, found_objects};
 use pcadlang_detectors::boxes::overlap;
 use pcadlang_detectors::objects::FoundObject;
 use pcadlang_engine::lang::error::Fault;
-use pcadlang_scene::vision::candidates::{Axis, Candidate, CandidateOptions, candidates};
+use pcadlang_scene::vision::candidates::{Axis, Candidate, CandidateOptions, candidates, enclosed};
 use pcadlang_scene::vision::segmentation::{Guess, Method, from_mask, guesses};
 use pcadlang_scene::vision::{Hint, Mask, Photo};
 use std::sync::Arc;
@@ -87,6 +87,31 @@ fn normalised(mut axes: Vec<(Axis, f64)>) -> Vec<(Axis, f64)> {
 }
 
 impl ImageValue {
+    /// Returns the places where a hint leaves open that an object of revolution may be, the
+    /// most probable first.
+    ///
+    /// # Errors
+    /// If a detector fails.
+    pub fn places(
+        &self,
+        options: &CandidateOptions,
+        hint: &Hint,
+    ) -> Result<Arc<Vec<Place>>, Fault> {
+        self.prepared().get((*options, hint.clone()), |(options, hint)| match self.as_photo() {
+            Some(photo) => places(self, photo, hint, options),
+            None => {
+                let mut all = regions(&enclosed(self.map()?, options));
+                normalise(&mut all);
+                Ok(all)
+            }
+        })
+    }
+
+    /// Returns the places that programs searched with its hint; `None` if none did.
+    pub fn known_places(&self) -> Option<Arc<Vec<Place>>> {
+        self.prepared().known(|(_, hint): &(CandidateOptions, Hint)| hint == self.hint())
+    }
+
     /// Returns guesses by all methods for a hint with a box or an axis.
     pub(super) fn guesses(&self, photo: &Photo, hint: &Hint) -> Result<Arc<Vec<Guess>>, Fault> {
         self.prepared().get(hint.clone(), |hint| Ok(guesses(photo, hint, &Method::ALL)))
