@@ -9,7 +9,7 @@
 //! 0.9.
 
 use pcadlang_scene::vision::candidates::{CandidateOptions, candidates};
-use pcadlang_scene::vision::{Limits, Mask, mask, photo};
+use pcadlang_scene::vision::{Limits, mask, photo};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -23,12 +23,6 @@ struct Outcome {
     seconds: f64,
 }
 
-fn overlap(a: &Mask, b: &Mask) -> f64 {
-    let pairs = || a.data().iter().zip(b.data());
-    let both = pairs().filter(|(a, b)| **a && **b).count();
-    both as f64 / pairs().filter(|(a, b)| **a || **b).count().max(1) as f64
-}
-
 fn look(folder: &Path, options: &CandidateOptions) -> Result<Outcome, String> {
     let read = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
     let (limits, image, truth) = (Limits::default(), read("image.png")?, read("mask.png")?);
@@ -37,10 +31,7 @@ fn look(folder: &Path, options: &CandidateOptions) -> Result<Outcome, String> {
     let start = Instant::now();
     let found = candidates(&photo, options);
     let seconds = start.elapsed().as_secs_f64();
-    let overlaps: Vec<f64> = found
-        .iter()
-        .map(|c| overlap(&c.mask, &truth.resized(c.mask.width(), c.mask.height())))
-        .collect();
+    let overlaps: Vec<f64> = found.iter().map(|c| c.mask.overlap(&truth)).collect();
     let best = FIRST.map(|n| overlaps.iter().take(n).copied().fold(0.0, f64::max));
     Ok(Outcome { best, count: found.len(), seconds })
 }

@@ -234,8 +234,8 @@ fn run(s: &Settings, kind: &str, case: &Case, seed: u64) -> Result<(f64, f64, St
     if !ran.status.success() {
         return Err(format!("{}: {}", case.name, String::from_utf8_lossy(&ran.stderr)));
     }
-    let fit = read_mask(&out.join("mask.png"))?.resized(case.mask.width(), case.mask.height());
-    Ok((overlap(&fit, &case.mask), toward(&out).unwrap_or(0.0), judged(&out).unwrap_or_default()))
+    let fit = read_mask(&out.join("mask.png"))?;
+    Ok((case.mask.overlap(&fit), toward(&out).unwrap_or(0.0), judged(&out).unwrap_or_default()))
 }
 
 /// The axis of the best state towards the camera.
@@ -280,21 +280,15 @@ fn show_places(case: &Case, kind: &str) -> Result<(), String> {
     let places = image.places(&CandidateOptions::default(), &wanted);
     println!("{}: box {:.0?}, {wanted:?}", case.name, bounds(&case.mask));
     for p in places.map_err(|e| e.message)?.iter().take(24) {
-        let truth = |m: &Mask| overlap(m, &case.mask.resized(m.width(), m.height()));
+        let truth = |m: &Mask| m.overlap(&case.mask);
         let overlaps: Vec<f64> = p.masks.iter().map(truth).collect();
         let apart = match &p.masks[..] {
-            [a, b] => overlap(a, b),
+            [a, b] => a.overlap(b),
             _ => 1.0,
         };
         println!("  {:12} {:.3} {overlaps:.2?} {apart:.2} {:.0?}", p.source, p.score, p.bounds);
     }
     Ok(())
-}
-
-fn overlap(a: &Mask, b: &Mask) -> f64 {
-    let pairs = || a.data().iter().zip(b.data());
-    let both = pairs().filter(|(a, b)| **a && **b).count();
-    both as f64 / pairs().filter(|(a, b)| **a || **b).count().max(1) as f64
 }
 
 fn main() -> Result<(), String> {

@@ -25,12 +25,6 @@ const OFF: f64 = 0.08;
 const AXIS_OFF: f64 = 0.03;
 const TRIED: u64 = 5;
 
-fn overlap(a: &Mask, b: &Mask) -> f64 {
-    let pairs = || a.data().iter().zip(b.data());
-    let both = pairs().filter(|(a, b)| **a && **b).count();
-    both as f64 / pairs().filter(|(a, b)| **a || **b).count().max(1) as f64
-}
-
 /// Left, top, right and bottom of a mask.
 fn bounds(mask: &Mask) -> [f64; 4] {
     let mut b = [f64::INFINITY, f64::INFINITY, 0.0, 0.0];
@@ -50,7 +44,7 @@ fn noise(seed: u64) -> f64 {
 
 /// The overlaps by name, and the score of the guess with the highest one.
 fn overlaps(all: &[Guess], truth: &Mask) -> [f64; NAMES.len()] {
-    let of = |g: &Guess| overlap(&g.mask.resized(truth.width(), truth.height()), truth);
+    let of = |g: &Guess| truth.overlap(&g.mask);
     let first = |m: Method| all.iter().find(|g| g.method == m).map_or(0.0, of);
     let top = all.iter().reduce(|a, b| if b.score > a.score { b } else { a });
     [

@@ -7,6 +7,11 @@ pub fn overlap(a: [f64; 4], b: [f64; 4]) -> f64 {
     both / (area(a) + area(b) - both).max(1e-12)
 }
 
+/// True if a position is in a box, its sides included.
+pub fn contains([left, top, right, bottom]: [f64; 4], [x, y]: [f64; 2]) -> bool {
+    (left..=right).contains(&x) && (top..=bottom).contains(&y)
+}
+
 #[cfg(test)]
 mod tests {
     use super::overlap;

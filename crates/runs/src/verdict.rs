@@ -45,13 +45,13 @@ impl Judgement {
     /// nothing suggests an outline.
     pub fn of(object: &Mask, places: &[Place], chains: Option<f64>) -> Option<Judgement> {
         let fit = |p: &Place| {
-            let all = p.masks.iter().map(|m| overlap(&object.resized(m.width(), m.height()), m));
+            let all = p.masks.iter().map(|m| m.overlap(object));
             all.sum::<f64>() / p.masks.len() as f64
         };
         let outlined = places.iter().filter(|p| !p.masks.is_empty());
         let (place, fit) = outlined.map(|p| (p, fit(p))).max_by(|a, b| a.1.total_cmp(&b.1))?;
         let outlines = match &place.masks[..] {
-            [a, b] => overlap(a, b),
+            [a, b] => a.overlap(b),
             _ => 1.0,
         };
         let agreement = chains.unwrap_or(1.0);
@@ -107,13 +107,6 @@ impl fmt::Display for Judgement {
         }
         Ok(())
     }
-}
-
-/// The intersection over union of two masks of one size.
-fn overlap(a: &Mask, b: &Mask) -> f64 {
-    let pairs = || a.data().iter().zip(b.data());
-    let both = pairs().filter(|(a, b)| **a && **b).count();
-    both as f64 / pairs().filter(|(a, b)| **a || **b).count().max(1) as f64
 }
 
 #[cfg(test)]

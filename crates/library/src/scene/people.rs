@@ -3,7 +3,7 @@
 use super::hint::{self, HINT};
 use super::observed::{KeypointsValue, MaskValue, PeopleKey};
 use super::{IMAGE, ImageValue, native};
-use pcadlang_detectors::boxes::overlap;
+use pcadlang_detectors::boxes::{contains, overlap};
 use pcadlang_detectors::people::{FindOptions, Person, networks};
 use pcadlang_engine::lang::builtins::{Row, Type, arg, int};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
@@ -75,7 +75,7 @@ pub(super) fn order(
         for p in positions {
             let at = [p[0] / f64::from(width), p[1] / f64::from(height)];
             let on: Vec<usize> = (0..found.len()).filter(|i| on_mask(&found[*i].1, at)).collect();
-            let within = || (0..found.len()).filter(|i| within(found[*i].0.bounds, *p)).collect();
+            let within = || (0..found.len()).filter(|i| contains(found[*i].0.bounds, *p)).collect();
             let on = if on.is_empty() { within() } else { on };
             on.into_iter().for_each(|i| counts[i] += 1);
         }
@@ -96,14 +96,7 @@ fn on_mask(person: &Value, at: [f64; 2]) -> bool {
     let Some(MaskValue { mask, .. }) = fields.get("mask").and_then(|m| m.downcast()) else {
         return false;
     };
-    let pixel = |x: f64, n: u32| ((x * f64::from(n)) as u32).min(n - 1) as usize;
-    let (i, j) = (pixel(at[0], mask.width()), pixel(at[1], mask.height()));
-    mask.data()[j * mask.width() as usize + i]
-}
-
-/// Returns whether a position is within a box of left, top, right and bottom.
-fn within([left, top, right, bottom]: [f64; 4], [x, y]: [f64; 2]) -> bool {
-    (left..=right).contains(&x) && (top..=bottom).contains(&y)
+    mask.at(at)
 }
 
 fn number(x: f64) -> Value {

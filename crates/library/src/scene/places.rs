@@ -2,7 +2,7 @@
 //! the boxes of a detector, or in regions that are nearly mirror-symmetric.
 
 use super::{ImageValue, found_objects};
-use pcadlang_detectors::boxes::overlap;
+use pcadlang_detectors::boxes::{contains, overlap};
 use pcadlang_detectors::objects::FoundObject;
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_scene::vision::candidates::{Axis, Candidate, CandidateOptions, candidates, enclosed};
@@ -182,11 +182,9 @@ pub(super) struct Seen {
 pub(super) fn boxes(photo: &Photo, objects: &[FoundObject], hint: &Hint) -> Vec<(Seen, f64)> {
     let clicked = !hint.at.is_empty();
     let round = |o: &&FoundObject| o.score >= LEAST && ROUND.contains(&o.name());
-    let inside =
-        |[l, t, r, b]: [f64; 4], [x, y]: [f64; 2]| (l..=r).contains(&x) && (t..=b).contains(&y);
     let meant = |o: &Seen| {
-        hint.at.iter().all(|p| inside(o.bounds, *p))
-            && !hint.not.iter().any(|p| inside(o.bounds, *p))
+        hint.at.iter().all(|p| contains(o.bounds, *p))
+            && !hint.not.iter().any(|p| contains(o.bounds, *p))
     };
     let (width, height) = (f64::from(photo.width()), f64::from(photo.height()));
     let weight = |o: &Seen| {
@@ -255,12 +253,8 @@ pub(super) fn normalise(places: &mut [Place]) {
 
 /// Returns the regions that clicks leave open; all of them if none fits.
 fn meant(mut all: Vec<Candidate>, photo: &Photo, hint: &Hint) -> Vec<Candidate> {
-    let has = |c: &Candidate, [x, y]: [f64; 2]| {
-        let (w, h) = (c.mask.width(), c.mask.height());
-        let column = (x / f64::from(photo.width()) * f64::from(w)) as u32;
-        let row = (y / f64::from(photo.height()) * f64::from(h)) as u32;
-        c.mask.data()[(row.min(h - 1) * w + column.min(w - 1)) as usize]
-    };
+    let size = [photo.width(), photo.height()].map(f64::from);
+    let has = |c: &Candidate, p: [f64; 2]| c.mask.at([p[0] / size[0], p[1] / size[1]]);
     let fits =
         |c: &Candidate| hint.at.iter().all(|p| has(c, *p)) && !hint.not.iter().any(|p| has(c, *p));
     if all.iter().any(fits) {

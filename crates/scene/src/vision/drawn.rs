@@ -49,12 +49,6 @@ pub fn vase(lean: f64) -> (Photo, Mask) {
     (Photo::from_rgb(picture).unwrap(), Mask::new(WIDTH, HEIGHT, mask).unwrap())
 }
 
-pub fn iou(a: &Mask, b: &Mask) -> f64 {
-    let pairs = || a.data().iter().zip(b.data());
-    pairs().filter(|(a, b)| **a && **b).count() as f64
-        / pairs().filter(|(a, b)| **a || **b).count() as f64
-}
-
 /// A bright vessel before a darker background, seen from above by a tilt: a cylinder with
 /// a dark inside.
 pub fn vessel(tilt: f64, below: bool) -> Photo {

@@ -40,6 +40,22 @@ impl Mask {
         &self.data
     }
 
+    /// True if a position is on the object: the fractions of the width and of the height at
+    /// which it is, 0 to 1.
+    pub fn at(&self, [x, y]: [f64; 2]) -> bool {
+        let pixel = |x: f64, n: u32| ((x * f64::from(n)) as u32).min(n - 1) as usize;
+        self.data[pixel(y, self.height) * self.width as usize + pixel(x, self.width)]
+    }
+
+    /// Returns the intersection over union with another mask at this one's size; 0 if both
+    /// are empty.
+    pub fn overlap(&self, other: &Mask) -> f64 {
+        let other = other.resized(self.width, self.height);
+        let pairs = || self.data.iter().zip(&other.data);
+        let both = pairs().filter(|(a, b)| **a && **b).count();
+        both as f64 / pairs().filter(|(a, b)| **a || **b).count().max(1) as f64
+    }
+
     /// Returns the mask at another size (at least 1 x 1): a pixel is on the object if at
     /// least half of its area is.
     pub fn resized(&self, width: u32, height: u32) -> Mask {
@@ -256,6 +272,16 @@ impl MaskLikelihood {
 mod tests {
     use super::*;
     use pcadlang_numerics::rng::{Purpose, StreamKey};
+
+    #[test]
+    fn positions_and_overlaps_are_those_of_the_pixels() {
+        let left = Mask::new(4, 1, vec![true, true, false, false]).unwrap();
+        let wide = Mask::new(2, 1, vec![true, true]).unwrap();
+        assert_eq!((left.overlap(&left), left.overlap(&wide)), (1.0, 0.5));
+        assert_eq!([0.0, 0.49, 0.5, 1.0].map(|x| left.at([x, 1.0])), [true, true, false, false]);
+        let empty = Mask::new(4, 1, vec![false; 4]).unwrap();
+        assert_eq!((left.overlap(&empty), empty.overlap(&empty)), (0.0, 0.0));
+    }
 
     #[test]
     fn probabilities_of_all_masks_sum_to_one() {

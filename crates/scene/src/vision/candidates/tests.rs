@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::vision::ContourMap;
-use crate::vision::drawn::{HEIGHT, LENGTH, MIDDLE, WIDTH, iou, noise, profile, vase, vessel};
+use crate::vision::drawn::{HEIGHT, LENGTH, MIDDLE, WIDTH, noise, profile, vase, vessel};
 use image::{Rgb, RgbImage};
 
 fn check_vase(lean: f64) {
@@ -14,7 +14,7 @@ fn check_vase(lean: f64) {
 /// Checks that the vase comes first in a list, with its axis and its widths.
 fn check_first(found: &[Candidate], truth: &Mask, lean: f64) {
     let first = found.first().expect("nothing was found");
-    let overlap = iou(&first.mask, &truth.resized(first.mask.width(), first.mask.height()));
+    let overlap = first.mask.overlap(truth);
     assert!(overlap > 0.9, "{overlap}");
     let axis = &first.axes[0];
     assert!(axis.symmetry > 0.9, "{}", axis.symmetry);
@@ -277,9 +277,7 @@ fn clean_contours_enclose_a_vase() {
         let found = enclosed(&map, &options);
         let (_, truth) = vase(lean);
         check_first(&found, &truth, lean);
-        let whole = |all: &[Candidate]| {
-            iou(&all[0].mask, &truth.resized(all[0].mask.width(), all[0].mask.height()))
-        };
+        let whole = |all: &[Candidate]| all[0].mask.overlap(&truth);
         assert!(found.len() == 1 && whole(&found) > 0.95, "{}", whole(&found));
         // With gaps of six pixels, and at smaller sizes.
         let mut gaps = ContourMap::new(WIDTH, HEIGHT);

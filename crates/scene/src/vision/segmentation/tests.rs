@@ -3,7 +3,7 @@
 use super::*;
 use crate::vision::AxisHint;
 use crate::vision::candidates::tilts;
-use crate::vision::drawn::{HEIGHT, LENGTH, MIDDLE, WIDTH, iou, noise, profile, vase, vessel};
+use crate::vision::drawn::{HEIGHT, LENGTH, MIDDLE, WIDTH, noise, profile, vase, vessel};
 use image::{Rgb, RgbImage};
 use pcadlang_numerics::num::simd::portable;
 
@@ -25,7 +25,7 @@ fn first(all: &[Guess], method: Method) -> &Guess {
 }
 
 fn overlap(guess: &Guess, truth: &Mask) -> f64 {
-    iou(&guess.mask, &truth.resized(guess.mask.width(), guess.mask.height()))
+    guess.mask.overlap(truth)
 }
 
 /// How far an axis leans to the right, radians.
