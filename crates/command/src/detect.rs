@@ -2,7 +2,7 @@
 
 use clap::Args;
 use image::RgbImage;
-use pcadlang_detectors::objects::{self, FoundObject, ObjectOptions};
+use pcadlang_detectors::objects::{self, FoundObject, ObjectOptions, View};
 use pcadlang_detectors::people::{FindOptions, Person, json};
 use pcadlang_report::pictures::{DETECTED, dots, limbs, picture_size, png};
 use pcadlang_runs::failure::{Failure, plain};
@@ -121,7 +121,9 @@ fn detect_people(a: &Detect, photo: &Photo) -> Result<(), Failure> {
 /// Detects the objects in a photograph, and lists them with the colours of their boxes.
 fn detect_objects(a: &Detect, photo: &Photo) -> Result<(), Failure> {
     let finder = objects::networks::finder().map_err(plain)?;
-    let found = finder.find(photo, &ObjectOptions::default()).map_err(|e| plain(e.to_string()))?;
+    let found = finder
+        .find(photo, View::WHOLE, &ObjectOptions::default())
+        .map_err(|e| plain(e.to_string()))?;
     let file = objects::json::coco(&found, (photo.width(), photo.height()), &name(a));
     write(a, "objects.json", &format!("{file:#}\n"), || boxes(photo, &found))?;
     match found.len() {

@@ -108,6 +108,9 @@ pub struct ChainResult {
     pub warmup: u64,
     /// The number of draws recorded.
     pub draws: u64,
+    /// The observations whose log densities are recorded: a hash of each one's address, and its
+    /// number of values.
+    pub observed: Option<Vec<(u64, usize)>>,
     /// Counts of what the kernels did.
     pub kernels: Vec<KernelStats>,
     /// Counts of single-site kernels, by address, if [`RunOptions::sites`] is set.

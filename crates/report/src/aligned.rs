@@ -14,7 +14,7 @@ use super::csv::{Contents, CsvError, CsvSink, DrawReader};
 use super::draws::{ChainDraws, Quantity, widen};
 use super::rundir::RunDir;
 use super::sinks::Memory;
-use pcadlang_inference::draws::{Column, DrawRow, Sink, merged};
+use pcadlang_inference::draws::{Column, DrawRow, Layout, POINTWISE, Sink, merged};
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Write};
 use std::path::Path;
@@ -32,20 +32,23 @@ pub(super) fn all_name(chain: u32) -> String {
 
 /// Brings the files of `chains` chains to the same columns and, if `even`, to the same
 /// number of draws: that of the shortest chain with any draws. Returns that number if
-/// draws were left out.
+/// draws were left out. Without `pointwise`, the log densities of single observed values are
+/// left out: they are of other observations in other chains.
 ///
 /// # Errors
 /// Returns an error if a file cannot be read or written.
-pub fn align(dir: &Path, chains: u32, even: bool) -> io::Result<Option<u64>> {
+pub fn align(dir: &Path, chains: u32, even: bool, pointwise: bool) -> io::Result<Option<u64>> {
     let found =
         (0..chains).map(|c| look(&dir.join(draws_name(c)))).collect::<io::Result<Vec<_>>>()?;
     let counts = || found.iter().map(|f| f.draws).filter(|n| *n > 0);
     let (fewest, most) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
     let keep = if even { fewest } else { most };
-    let columns = found.iter().fold(Vec::new(), |all, f| merged(&all, &f.columns));
+    let all = found.iter().fold(Vec::new(), |all, f| merged(&all, &f.columns));
+    let mut columns = all.clone();
+    columns.retain(|c| pointwise || c.name != POINTWISE);
     for (chain, f) in (0..chains).zip(&found).filter(|(_, f)| f.draws > 0) {
         if f.draws > keep || f.heads != 1 || f.columns != columns {
-            rewrite(dir, chain, f, &columns, keep)?;
+            rewrite(dir, chain, f, (&all, &columns), keep)?;
         }
     }
     Ok((keep < most).then_some(keep))
@@ -70,17 +73,18 @@ pub(super) fn look(path: &Path) -> io::Result<Contents> {
     Contents::of(BufReader::new(File::open(path)?)).map_err(CsvError::into_io)
 }
 
-/// Rewrites a chain's file with its first draws in the given columns, and keeps the old
-/// file.
+/// Rewrites a chain's file with its first draws, and keeps the old file. The columns are
+/// those of all chains, and those that stay.
 fn rewrite(
     dir: &Path,
     chain: u32,
     found: &Contents,
-    columns: &[Column],
+    (all, columns): (&[Column], &[Column]),
     keep: u64,
 ) -> io::Result<()> {
     let path = dir.join(draws_name(chain));
-    let mut reader = DrawReader::new(BufReader::new(File::open(&path)?), columns, u64::MAX);
+    let layout = Layout::new(all, columns);
+    let mut reader = DrawReader::new(BufReader::new(File::open(&path)?), all, u64::MAX);
     let new = begin(dir, &draws_name(chain), |file| {
         let mut out = BufWriter::new(file);
         out.write_all(found.comments.as_bytes())?;
@@ -88,7 +92,8 @@ fn rewrite(
         sink.columns(columns)?;
         for draw in 0..keep.min(found.draws) {
             let Some(row) = reader.next_row().map_err(CsvError::into_io)? else { break };
-            sink.draw(&DrawRow { chain, draw, ..row })?;
+            let values = layout.apply(&row.values);
+            sink.draw(&DrawRow { chain, draw, values, ..row })?;
         }
         sink.flush()
     })?;
@@ -179,7 +184,7 @@ mod tests {
         std::fs::write(dir.join("chain-2.csv"), &two).unwrap();
         // A chain that was stopped before it began.
         std::fs::write(dir.join("chain-3.csv"), "# id = 3\n").unwrap();
-        assert_eq!(align(&dir, 3, true).unwrap(), Some(2));
+        assert_eq!(align(&dir, 3, true, true).unwrap(), Some(2));
         let chain = |name: &str| read(&std::fs::read_to_string(dir.join(name)).unwrap()).unwrap();
         let (a, b) = (chain("chain-1.csv"), chain("chain-2.csv"));
         assert_eq!(a.columns, b.columns);
@@ -195,13 +200,27 @@ mod tests {
         assert!(a.comments.contains(&("steps".into(), "2".into())));
         // All draws are still there, and are restored.
         assert_eq!(chain("draws-2.csv").rows.len(), 3);
-        assert_eq!(align(&dir, 3, true).unwrap(), None, "nothing is left to do");
+        assert_eq!(align(&dir, 3, true, true).unwrap(), None, "nothing is left to do");
         (0..3).for_each(|c| restore(&dir, c).unwrap());
         assert_eq!(std::fs::read_to_string(dir.join("chain-1.csv")).unwrap(), one);
         assert_eq!(std::fs::read_to_string(dir.join("chain-2.csv")).unwrap(), two);
         assert!(!dir.join("draws-1.csv").exists());
+        // Log densities of different observations in different chains are left out.
+        let observed = |k: &str| format!("# id = 1\n{NAMES},log_lik.1,k\n-1,1,0,0,-1,1,-3,{k}\n");
+        std::fs::write(dir.join("chain-1.csv"), observed("5")).unwrap();
+        std::fs::write(dir.join("chain-2.csv"), observed("6")).unwrap();
+        assert_eq!(align(&dir, 2, true, false).unwrap(), None);
+        let (a, b) = (chain("chain-1.csv"), chain("chain-2.csv"));
+        assert_eq!(
+            (a.columns.len(), &a.rows[0].values, &b.rows[0].values),
+            (1, &vec![5.0], &vec![6.0])
+        );
+        (0..2).for_each(|c| restore(&dir, c).unwrap());
+        assert_eq!(chain("chain-1.csv").columns.len(), 2);
+        std::fs::write(dir.join("chain-1.csv"), &one).unwrap();
+        std::fs::write(dir.join("chain-2.csv"), &two).unwrap();
         // No draws of an interrupted run are left out.
-        assert_eq!(align(&dir, 3, false).unwrap(), None);
+        assert_eq!(align(&dir, 3, false, true).unwrap(), None);
         assert_eq!((chain("chain-1.csv").rows.len(), chain("chain-2.csv").rows.len()), (2, 3));
         std::fs::remove_dir_all(&dir).unwrap();
     }

@@ -57,7 +57,7 @@ impl Quantity {
 }
 
 impl ChainDraws {
-    /// Converts the draws to other columns, which must include the current ones.
+    /// Converts the draws to other columns, by name.
     #[doc(hidden)]
     pub fn widen(&mut self, columns: Vec<Column>) {
         let layout = Layout::new(&self.columns, &columns);
@@ -65,6 +65,12 @@ impl ChainDraws {
             self.rows.iter_mut().for_each(|r| r.values = layout.apply(&r.values));
         }
         self.columns = columns;
+    }
+
+    /// Drops the log densities of single observed values.
+    pub fn drop_pointwise(&mut self) {
+        let others = self.columns.iter().filter(|c| c.name != POINTWISE);
+        self.widen(others.cloned().collect());
     }
 }
 

@@ -347,12 +347,17 @@ impl Fill<'_> {
         write_lines(dir, TRAJECTORY, &watched.trajectory.all())?;
         let mut draws: Vec<ChainDraws> = watched.memories.iter().map(Memory::draws).collect();
         // A run that may be resumed keeps all its draws.
-        let even = align(dir.path(), self.job.sampling.chains(), !interrupted)
+        let mut observed = ran.chains.iter().filter(|c| c.draws > 0).map(|c| &c.observed);
+        let same = observed.next().is_none_or(|first| observed.all(|other| other == first));
+        let even = align(dir.path(), self.job.sampling.chains(), !interrupted, same)
             .map_err(|e| plain(format!("{}: {e}; its draws are kept", dir.path().display())))?;
         if let Some(even) = even {
             draws.iter_mut().for_each(|d| d.rows.retain(|r| r.draw < even));
         }
         widen(&mut draws);
+        if !same {
+            draws.iter_mut().for_each(ChainDraws::drop_pointwise);
+        }
         let points = ran.chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
         let mut step_sizes = vec![None; draws.len()];
         for (c, i) in ran.chains.iter().zip(&ran.places) {

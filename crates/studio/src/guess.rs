@@ -28,7 +28,7 @@ fn described(place: &Place, hint: &Hint, size: (u32, u32)) -> Value {
     // An outline is its own answer, corner by corner.
     let outlines: Vec<Vec<Vec<[f64; 2]>>> = match hint.outline.is_empty() || hint.mask.is_some() {
         true => place.masks.iter().map(|mask| outlines(mask, size)).collect(),
-        false => vec![vec![hint.outline.clone()]],
+        false => vec![vec![hint.curve()]],
     };
     json!({
         "source": place.source, "score": place.score, "box": place.bounds, "outlines": outlines,

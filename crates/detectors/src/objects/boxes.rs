@@ -1,5 +1,6 @@
 //! From the network's outputs to boxes, as NanoDet's authors define them.
 
+use super::sample::Placed;
 use super::{BINS, CLASSES, FoundObject, SIDE, STRIDES};
 use crate::boxes::overlap;
 
@@ -9,16 +10,10 @@ const OVERLAP: f64 = 0.6;
 /// dropped.
 const CANDIDATES: usize = 1000;
 
-/// Returns the candidates with a score of at least `least`, best first, within a photograph
-/// of this size in pixels. `grids` are, for each stride, the scores by cell and class, and
-/// the bins by cell, side of the box and distance; `scale` is the number of samples to a
-/// pixel.
-pub(super) fn decode(
-    grids: &[[&[f32]; 2]; 3],
-    scale: [f64; 2],
-    size: [f64; 2],
-    least: f64,
-) -> Vec<FoundObject> {
+/// Returns the candidates with a score of at least `least`, best first, within a photograph.
+/// `grids` are, for each stride, the scores by cell and class, and the bins by cell, side of
+/// the box and distance.
+pub(super) fn decode(grids: &[[&[f32]; 2]; 3], placed: &Placed, least: f64) -> Vec<FoundObject> {
     let mut all = Vec::new();
     for ([scores, sides], stride) in grids.iter().zip(STRIDES) {
         let cells = scores.chunks_exact(CLASSES.len()).zip(sides.chunks_exact(4 * BINS));
@@ -26,8 +21,7 @@ pub(super) fn decode(
             let mut bounds = None;
             for (class, score) in scores.iter().map(|s| f64::from(*s)).enumerate() {
                 if score >= least && score <= 1.0 {
-                    let bounds =
-                        *bounds.get_or_insert_with(|| within(i, stride, sides, scale, size));
+                    let bounds = *bounds.get_or_insert_with(|| within(i, stride, sides, placed));
                     all.extend(bounds.map(|bounds| FoundObject { bounds, class, score }));
                 }
             }
@@ -40,20 +34,18 @@ pub(super) fn decode(
 }
 
 /// Returns the box of a cell, clipped to the photograph; `None` if nothing of it is left.
-fn within(
-    cell: usize,
-    stride: usize,
-    sides: &[f32],
-    scale: [f64; 2],
-    size: [f64; 2],
-) -> Option<[f64; 4]> {
+fn within(cell: usize, stride: usize, sides: &[f32], placed: &Placed) -> Option<[f64; 4]> {
     let row = SIDE / stride;
     let centre = [cell % row, cell / row].map(|i| (i as f64 + 0.5) * stride as f64 - 0.5);
     let mut bounds = [0.0; 4];
     for (k, (bound, bins)) in bounds.iter_mut().zip(sides.chunks_exact(BINS)).enumerate() {
         let distance = expectation(bins) * stride as f64;
         let at = centre[k % 2] + if k < 2 { -distance } else { distance };
-        *bound = (at / scale[k % 2]).clamp(0.0, size[k % 2]);
+        let c = k % 2;
+        *bound = ((at - placed.origin[c] as f64) / placed.scale[c]).clamp(0.0, placed.size[c]);
+    }
+    if placed.mirrored {
+        (bounds[0], bounds[2]) = (placed.size[0] - bounds[2], placed.size[0] - bounds[0]);
     }
     let [left, top, right, bottom] = bounds;
     (right > left && bottom > top).then_some(bounds)

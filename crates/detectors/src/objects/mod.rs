@@ -24,6 +24,21 @@ const STRIDES: [usize; 3] = [8, 16, 32];
 /// The number of distances that each side of a box is a mixture of, in strides: 0 to 10.
 const BINS: usize = 11;
 
+/// A view of a photograph: the network sees things best that take up as much of its input as
+/// those that it was trained with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// The part of the input that the longer side takes up: above 0, at most 1.
+    pub part: f64,
+    /// True to exchange left and right.
+    pub mirrored: bool,
+}
+
+impl View {
+    /// The photograph as it is, as large as it can be.
+    pub const WHOLE: View = View { part: 1.0, mirrored: false };
+}
+
 /// Options of the search for objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectOptions {
@@ -81,20 +96,21 @@ impl ObjectFinder {
         Ok(ObjectFinder { network, outputs })
     }
 
-    /// Returns the objects in a photograph, those with the highest scores first.
+    /// Returns the objects in a photograph, as seen in one view of it, those with the highest
+    /// scores first.
     ///
     /// # Errors
     /// Errors of the network, which valid ones do not have.
     pub fn find(
         &self,
         photo: &Photo,
+        view: View,
         options: &ObjectOptions,
     ) -> Result<Vec<FoundObject>, NetworkError> {
-        let (input, scale) = sample::letterbox(photo, SIDE);
+        let (input, placed) = sample::letterbox(photo, SIDE, view);
         let outputs = self.network.run(input)?;
         let grids = self.outputs.map(|pair| pair.map(|i| &outputs[i][..]));
-        let size = [photo.width(), photo.height()].map(f64::from);
-        let found = boxes::decode(&grids, scale, size, options.least);
+        let found = boxes::decode(&grids, &placed, options.least);
         Ok(boxes::best(found, options.most))
     }
 }

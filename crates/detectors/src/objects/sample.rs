@@ -1,5 +1,6 @@
 //! A photograph as the network's input.
 
+use super::View;
 use pcadlang_scene::vision::Photo;
 
 /// The means and standard deviations of blue, green and red that the network was trained
@@ -7,14 +8,31 @@ use pcadlang_scene::vision::Photo;
 const MEANS: [f32; 3] = [103.53, 116.28, 123.675];
 const DEVIATIONS: [f32; 3] = [57.375, 57.12, 58.395];
 
-/// Returns a photograph scaled to a longer side of `side` samples, with black at the right
-/// or below, as planes of blue, green and red; and the number of samples to a pixel. A
-/// sample is the mean of the area that it covers.
-pub(super) fn letterbox(photo: &Photo, side: usize) -> (Vec<f32>, [f64; 2]) {
+/// Where a photograph is among the samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Placed {
+    /// The sample of the photograph's upper left corner, across and down.
+    pub origin: [usize; 2],
+    /// The number of samples to a pixel.
+    pub scale: [f64; 2],
+    /// The size of the photograph, pixels.
+    pub size: [f64; 2],
+    /// True if left and right are exchanged.
+    pub mirrored: bool,
+}
+
+/// Returns a photograph scaled so that its longer side takes up a view's part of `side`
+/// samples, the rest black, as planes of blue, green and red; and where it is. A whole view
+/// has black at the right or below, a smaller one around it. A sample is the mean of the area
+/// that it covers.
+pub(super) fn letterbox(photo: &Photo, side: usize, view: View) -> (Vec<f32>, Placed) {
     let (width, height) = (photo.width() as usize, photo.height() as usize);
     let rgb = photo.rgb().as_raw();
     let longer = width.max(height).max(1) as f64;
-    let fit = |n: usize| (libm::round(n as f64 * side as f64 / longer) as usize).clamp(1, side);
+    let taken = view.part * side as f64;
+    let fit = |n: usize| (libm::round(n as f64 * taken / longer) as usize).clamp(1, side);
+    let origin = [width, height]
+        .map(|n| (0.5 * (1.0 - view.part) * n as f64 * side as f64 / longer) as usize);
     let (columns, rows) = (parts(width, fit(width)), parts(height, fit(height)));
     let mut out = vec![0.0; 3 * side * side];
     let mut line = vec![[0f32; 3]; columns.len()];
@@ -30,14 +48,18 @@ pub(super) fn letterbox(photo: &Photo, side: usize) -> (Vec<f32>, [f64; 2]) {
             }
         }
         for (i, sum) in line.iter().enumerate() {
+            let i = if view.mirrored { line.len() - 1 - i } else { i };
+            let p = (origin[1] + j) * side + origin[0] + i;
             // Blue first.
-            (0..3).for_each(|c| out[(c * side + j) * side + i] = sum[2 - c]);
+            (0..3).for_each(|c| out[c * side * side + p] = sum[2 - c]);
         }
     }
     for (c, plane) in out.chunks_exact_mut(side * side).enumerate() {
         plane.iter_mut().for_each(|v| *v = (*v - MEANS[c]) / DEVIATIONS[c]);
     }
-    (out, [columns.len() as f64 / width.max(1) as f64, rows.len() as f64 / height.max(1) as f64])
+    let size = [width, height].map(|n| n.max(1) as f64);
+    let scale = [columns.len() as f64 / size[0], rows.len() as f64 / size[1]];
+    (out, Placed { origin, scale, size, mirrored: view.mirrored })
 }
 
 /// The pixels of a sample along a side: the first one, and the shares of it and the next ones.
@@ -76,8 +98,8 @@ mod tests {
     fn samples_are_means_of_areas_and_the_rest_is_black() {
         // Five columns on two samples: 1, 1, 1/2 and 1/2, 1, 1.
         let rgb = RgbImage::from_fn(5, 2, |x, y| Rgb([10 * x as u8, 100 * y as u8, 7]));
-        let (out, scale) = letterbox(&Photo::from_rgb(rgb).unwrap(), 2);
-        assert_eq!(scale, [2.0 / 5.0, 1.0 / 2.0]);
+        let (out, placed) = letterbox(&Photo::from_rgb(rgb).unwrap(), 2, View::WHOLE);
+        assert_eq!((placed.scale, placed.origin), ([2.0 / 5.0, 1.0 / 2.0], [0, 0]));
         let value =
             |c: usize, j: usize, i: usize| out[(c * 2 + j) * 2 + i] * DEVIATIONS[c] + MEANS[c];
         for (c, expected) in [(0, [7.0, 7.0]), (1, [50.0, 50.0]), (2, [8.0, 32.0])] {
@@ -91,11 +113,25 @@ mod tests {
     #[test]
     fn small_photographs_are_interpolated() {
         let rgb = RgbImage::from_fn(1, 2, |_, y| Rgb([80 * y as u8; 3]));
-        let (out, scale) = letterbox(&Photo::from_rgb(rgb).unwrap(), 4);
-        assert_eq!(scale, [2.0, 2.0]);
+        let (out, placed) = letterbox(&Photo::from_rgb(rgb).unwrap(), 4, View::WHOLE);
+        assert_eq!(placed.scale, [2.0, 2.0]);
         let column: Vec<f32> = (0..4).map(|j| out[4 * j] * DEVIATIONS[0] + MEANS[0]).collect();
         for (got, expected) in column.iter().zip([0.0, 20.0, 60.0, 80.0]) {
             assert!((got - expected).abs() < 1e-4, "{column:?}");
         }
+    }
+
+    #[test]
+    fn smaller_views_are_in_the_middle_and_may_be_mirrored() {
+        let rgb = RgbImage::from_fn(4, 2, |x, _| Rgb([10 + 20 * x as u8; 3]));
+        let view = View { part: 0.5, mirrored: true };
+        let (out, placed) = letterbox(&Photo::from_rgb(rgb).unwrap(), 8, view);
+        assert_eq!((placed.origin, placed.scale), ([2, 1], [1.0, 1.0]));
+        let is = |j: usize, wanted: [f32; 8]| {
+            let row = out[8 * j..][..8].iter().map(|v| v * DEVIATIONS[0] + MEANS[0]);
+            row.zip(wanted).all(|(a, b)| (a - b).abs() < 1e-4)
+        };
+        assert!(is(1, [0.0, 0.0, 70.0, 50.0, 30.0, 10.0, 0.0, 0.0]));
+        assert!(is(3, [0.0; 8]));
     }
 }

@@ -1,7 +1,8 @@
 //! Tests of boxes from outputs made by hand, and with the included network of photographs.
 
 use super::boxes::{best, decode};
-use super::{BINS, CLASSES, FoundObject, ObjectFinder, ObjectOptions, networks};
+use super::sample::Placed;
+use super::{BINS, CLASSES, FoundObject, ObjectFinder, ObjectOptions, View, networks};
 use pcadlang_scene::vision::{Limits, Photo, photo};
 
 /// Outputs of all strides without an object, and with equal probabilities of all distances.
@@ -17,7 +18,9 @@ fn certain(sides: &mut [f32], cell: usize, side: usize, bin: usize) {
 fn decoded(outputs: &[[Vec<f32>; 2]; 3], least: f64) -> Vec<FoundObject> {
     let grids = [0, 1, 2].map(|k| [&outputs[k][0][..], &outputs[k][1][..]]);
     // Half a sample to a pixel across, a whole one down.
-    decode(&grids, [0.5, 1.0], [700.0, 400.0], least)
+    let placed =
+        Placed { origin: [0; 2], scale: [0.5, 1.0], size: [700.0, 400.0], mirrored: false };
+    decode(&grids, &placed, least)
 }
 
 #[test]
@@ -65,7 +68,11 @@ fn example(name: &str) -> Photo {
 }
 
 fn found(photo: &Photo) -> Vec<FoundObject> {
-    networks::finder().unwrap().find(photo, &ObjectOptions::default()).unwrap()
+    seen(photo, View::WHOLE)
+}
+
+fn seen(photo: &Photo, view: View) -> Vec<FoundObject> {
+    networks::finder().unwrap().find(photo, view, &ObjectOptions::default()).unwrap()
 }
 
 #[test]
@@ -80,6 +87,17 @@ fn objects_are_found_in_photographs() {
     // Without its handle.
     assert!(near(cup.bounds, [92.0, 9.0, 219.0, 146.0], 15.0), "{cup:?}");
     assert!(all.windows(2).all(|w| w[0].score >= w[1].score));
+}
+
+#[test]
+fn every_view_has_its_boxes_in_the_photograph() {
+    let photo = example("skier.jpg");
+    for (part, mirrored) in [(1.0, true), (0.6, false), (0.6, true)] {
+        let skier = seen(&photo, View { part, mirrored })[0];
+        let wanted = [62.0, 44.0, 277.0, 392.0];
+        let near = skier.bounds.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 20.0);
+        assert!(skier.name() == "person" && near, "{part} {mirrored}: {skier:?}");
+    }
 }
 
 #[test]

@@ -177,6 +177,7 @@ impl<'a> Runner<'a> {
             steps,
             warmup,
             draws: self.draws,
+            observed: self.recorder.observed().clone(),
             kernels: self.instances.into_iter().map(Instance::into_stats).collect(),
             sites: self.sites.into_stats(),
             seconds,

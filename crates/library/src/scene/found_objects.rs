@@ -1,7 +1,7 @@
 //! The objects in a photograph, as values: a thin layer over [`pcadlang_detectors::objects`].
 
 use super::{IMAGE, ImageValue, native};
-use pcadlang_detectors::objects::{CLASSES, FoundObject, ObjectOptions, networks};
+use pcadlang_detectors::objects::{CLASSES, FoundObject, ObjectOptions, View, networks};
 use pcadlang_engine::lang::builtins::{Args, Default, Domain, Row, Type, arg, int, num};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
@@ -11,9 +11,23 @@ use std::sync::Arc;
 /// programs choose among them.
 const LEAST: f64 = 0.01;
 
-/// The key of the objects prepared from a photograph.
+/// The views in which objects are looked for where a box that is missed or off costs more than
+/// the time: the larger an object is in the picture, the smaller the view that shows it as the
+/// network knows its kind (docs/measurements/objects.md).
+pub(super) const VIEWS: [View; 6] = {
+    const PARTS: [f64; 3] = [1.0, 0.67, 0.55];
+    let mut all = [View::WHOLE; 6];
+    let mut i = 0;
+    while i < 6 {
+        all[i] = View { part: PARTS[i / 2], mirrored: i % 2 == 1 };
+        i += 1;
+    }
+    all
+};
+
+/// The key of the objects prepared from views of a photograph.
 #[derive(Clone, PartialEq)]
-struct All;
+struct Viewed(Vec<View>);
 
 pub(super) const TABLE: &[Row] = &[native(
     "objects",
@@ -32,7 +46,7 @@ pub(super) const TABLE: &[Row] = &[native(
     |a| {
         let image = a.object::<ImageValue>(0, "an image")?;
         let (most, least, classes) = (a.int("most")?, a.num("least")?, classes(a)?);
-        let found = found(image)?;
+        let found = found(image, &[View::WHOLE])?;
         let wanted = |o: &&FoundObject| {
             o.score >= least && (classes.is_empty() || classes.contains(&o.name()))
         };
@@ -40,18 +54,32 @@ pub(super) const TABLE: &[Row] = &[native(
     },
 )];
 
-/// Returns all objects that are seen in a photograph, those with the highest scores first;
-/// none in a contour map.
+/// Returns all objects that are seen in some views of a photograph, each once for each view,
+/// those with the highest scores first; none in a contour map.
 ///
 /// # Errors
 /// Those of the detector.
-pub(super) fn found(image: &ImageValue) -> Result<Arc<Vec<FoundObject>>, Fault> {
-    image.prepared().get(All, |_| {
+pub(super) fn found(image: &ImageValue, views: &[View]) -> Result<Arc<Vec<FoundObject>>, Fault> {
+    image.prepared().get(Viewed(views.to_vec()), |Viewed(views)| {
         let Some(photo) = image.as_photo() else { return Ok(Vec::new()) };
         let fault = |why: String| Fault::new(FaultKind::Other, format!("scene.objects: {why}"));
         let options = ObjectOptions { least: LEAST, most: usize::MAX };
         let finder = networks::finder().map_err(|why| fault(why.into()))?;
-        finder.find(photo, &options).map_err(|e| fault(e.to_string()))
+        let seen: Vec<_> = std::thread::scope(|scope| {
+            let begin = |view: &View| {
+                let (view, options) = (*view, &options);
+                scope.spawn(move || finder.find(photo, view, options))
+            };
+            let running: Vec<_> = views.iter().map(begin).collect();
+            running.into_iter().map(|r| r.join()).collect()
+        });
+        let mut all = Vec::new();
+        for found in seen {
+            let found = found.map_err(|_| fault("a thread failed".into()))?;
+            all.extend(found.map_err(|e| fault(e.to_string()))?);
+        }
+        all.sort_by(|a, b| b.score.total_cmp(&a.score));
+        Ok(all)
     })
 }
 

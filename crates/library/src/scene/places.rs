@@ -1,7 +1,8 @@
 //! Places in a photograph where an object of revolution may be: where the user points, in
 //! the boxes of a detector, or in regions that are nearly mirror-symmetric.
 
-use super::{ImageValue, found_objects};
+use super::ImageValue;
+use super::found_objects::{VIEWS, found};
 use pcadlang_detectors::boxes::{contains, overlap};
 use pcadlang_detectors::objects::FoundObject;
 use pcadlang_engine::lang::error::Fault;
@@ -147,15 +148,16 @@ pub(super) fn places(
         let all = image.guesses(photo, hint)?;
         return Ok(vec![Place::guessed(source, 1.0, hint.bounds, &all)]);
     }
-    let boxes = boxes(photo, &found_objects::found(image)?, hint);
+    let boxes = boxes(photo, &found(image, &VIEWS)?, hint);
     let seen = boxes.iter().map(|(o, weight)| {
         let bounds = Some(sized(o.bounds));
         let all = image.guesses(photo, &Hint { bounds, ..hint.clone() })?;
         Ok(Place::guessed(o.class, *weight, bounds, &all))
     });
     let mut all: Vec<Place> = seen.collect::<Result<_, Fault>>()?;
-    if !hint.at.is_empty() {
+    if !hint.at.is_empty() && !all.is_empty() {
         normalise(&mut all);
+        return Ok(all);
     }
     all.extend(regions(&meant(image.regions(photo, options)?.to_vec(), photo, hint)));
     normalise(&mut all);
@@ -168,12 +170,13 @@ pub(super) fn sized([left, top, right, bottom]: [f64; 4]) -> [f64; 4] {
 }
 
 /// A box where the detector sees a vessel or a fruit, of whatever class: the mean of boxes
-/// that overlap, weighted by the squares of their scores.
+/// that overlap, weighted by the squares of their scores (after Solovyev et al. 2021,
+/// "Weighted boxes fusion", Image and Vision Computing 107, 104117).
 pub(super) struct Seen {
     /// The class with the highest score.
     pub class: &'static str,
     pub bounds: [f64; 4],
-    /// The sum of the scores, and of their squares.
+    /// The sum of the scores, over the number of views, and the sum of their squares.
     score: f64,
     sure: f64,
 }
@@ -199,6 +202,7 @@ pub(super) fn boxes(photo: &Photo, objects: &[FoundObject], hint: &Hint) -> Vec<
         let cut_off = touched.into_iter().filter(|t| *t).map(|_| CUT_OFF).product::<f64>();
         o.score * central * area.sqrt().sqrt() * cut_off
     };
+    let share = |o: &FoundObject| o.score / VIEWS.len() as f64;
     let mut all: Vec<Seen> = Vec::new();
     for o in objects.iter().filter(round) {
         match all.iter_mut().find(|s| overlap(s.bounds, o.bounds) > SAME) {
@@ -206,12 +210,12 @@ pub(super) fn boxes(photo: &Photo, objects: &[FoundObject], hint: &Hint) -> Vec<
                 let sure = o.score * o.score;
                 let mean = |k: usize| (s.sure * s.bounds[k] + sure * o.bounds[k]) / (s.sure + sure);
                 s.bounds = [0, 1, 2, 3].map(mean);
-                (s.score, s.sure) = (s.score + o.score, s.sure + sure);
+                (s.score, s.sure) = (s.score + share(o), s.sure + sure);
             }
             None => all.push(Seen {
                 class: o.name(),
                 bounds: o.bounds,
-                score: o.score,
+                score: share(o),
                 sure: o.score * o.score,
             }),
         }

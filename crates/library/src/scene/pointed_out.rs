@@ -1,8 +1,9 @@
 //! What a user is shown while pointing out an object: the place that is meant, without axes
 //! and before anything is sampled.
 
+use super::ImageValue;
+use super::found_objects::{VIEWS, found};
 use super::places::{Place, boxes, sized};
-use super::{ImageValue, found_objects};
 use pcadlang_detectors::people::Person;
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_scene::vision::candidates::CandidateOptions;
@@ -37,13 +38,13 @@ impl ImageValue {
             return Ok((!hint.is_empty()).then(|| of_person(photo, person)));
         }
         if hint.is_empty() {
-            return found_objects::found(self).map(|_| None);
+            return found(self, &VIEWS).map(|_| None);
         }
         let (source, score, bounds) = match (hint.axis, hint.bounds) {
             (Some(_), bounds) => ("axis", 1.0, bounds),
             (None, Some(bounds)) => ("box", 1.0, Some(bounds)),
             (None, None) => {
-                let seen = boxes(photo, &found_objects::found(self)?, hint);
+                let seen = boxes(photo, &found(self, &VIEWS)?, hint);
                 let total: f64 = seen.iter().map(|(_, weight)| weight).sum();
                 match seen.first() {
                     Some((o, weight)) => (o.class, weight / total, Some(sized(o.bounds))),

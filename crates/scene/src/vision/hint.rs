@@ -4,6 +4,9 @@ use super::{Mask, VisionError};
 
 /// The maximum number of corners of an outline, and of positions.
 const MOST: usize = 10_000;
+/// The minimum number of corners of a curve, and the number of its points from one to the next.
+const CURVED: usize = 6;
+const STEPS: usize = 8;
 
 /// Where an object is in a photograph; every part is optional. Positions are in pixels of
 /// the photograph, x to the right and y down from its top left corner.
@@ -11,7 +14,8 @@ const MOST: usize = 10_000;
 pub struct Hint {
     /// The object's pixels, of any resolution.
     pub mask: Option<Mask>,
-    /// Corners of a polygon around the object: none, or at least three.
+    /// Positions around the object: none, or at least three. Up to five are the corners of a
+    /// polygon; through more, the outline is a smooth curve ([`Hint::curve`]).
     pub outline: Vec<[f64; 2]>,
     /// A box around the object: left, top, width and height, both above 0.
     pub bounds: Option<[f64; 4]>,
@@ -120,9 +124,29 @@ impl Hint {
     pub fn drawn(&self, width: u32, height: u32) -> Option<Mask> {
         match &self.mask {
             Some(mask) => Some(mask.resized(width, height)),
-            None if self.outline.len() >= 3 => polygon(&self.outline, width, height),
+            None if self.outline.len() >= 3 => polygon(&self.curve(), width, height),
             None => None,
         }
+    }
+
+    /// Returns the outline as the corners of a polygon: of six or more positions, points of the
+    /// closed curve through them (Catmull & Rom 1974, "A class of local interpolating splines"),
+    /// since a polygon through a few positions of a round outline is inside it.
+    pub fn curve(&self) -> Vec<[f64; 2]> {
+        let n = self.outline.len();
+        if n < CURVED {
+            return self.outline.clone();
+        }
+        let point = |i: usize| {
+            let [a, b, c, d] = [n - 1, 0, 1, 2].map(|k| self.outline[(i / STEPS + k) % n]);
+            let u = (i % STEPS) as f64 / STEPS as f64;
+            [0, 1].map(|k| {
+                let bend = u * (2.0 * a[k] - 5.0 * b[k] + 4.0 * c[k] - d[k]);
+                let bend = bend + u * u * (3.0 * (b[k] - c[k]) + d[k] - a[k]);
+                b[k] + 0.5 * u * (c[k] - a[k] + bend)
+            })
+        };
+        (0..n * STEPS).map(point).collect()
     }
 
     /// Returns a box around the object, left, top, width and height: the one given, or that
@@ -179,6 +203,27 @@ mod tests {
         let on: Vec<usize> = (0..24).filter(|i| mask.data()[*i]).collect();
         assert_eq!(on, [7, 8, 9, 13, 14, 15]);
         assert_eq!(hint.around(6, 4), Some([1.0, 1.0, 3.0, 2.0]));
+    }
+
+    #[test]
+    fn few_corners_are_a_polygon_and_more_a_curve() {
+        let circle = |n: usize| {
+            let at = |i| libm::sincos(i as f64 / n as f64 * std::f64::consts::TAU);
+            (0..n).map(|i| at(i)).map(|(s, c)| [50.0 + 40.0 * c, 50.0 + 40.0 * s]).collect()
+        };
+        let area = |n: usize| {
+            let hint = Hint { outline: circle(n), ..Hint::default() };
+            let mask = hint.drawn(100, 100).expect("an outline");
+            mask.data().iter().filter(|on| **on).count() as f64 / (40.0 * 40.0)
+        };
+        // Squares and pentagons as they are: n/2 sin(2 pi/n).
+        assert!((area(4) - 2.0).abs() < 0.02 && (area(5) - 2.378).abs() < 0.02);
+        // The octagon would have 2.83.
+        assert!((area(8) - std::f64::consts::PI).abs() < 0.05, "{}", area(8));
+        // The curve goes through the positions.
+        let hint = Hint { outline: circle(7), ..Hint::default() };
+        let through: Vec<[f64; 2]> = hint.curve().into_iter().step_by(STEPS).collect();
+        assert_eq!(through, hint.outline);
     }
 
     #[test]
