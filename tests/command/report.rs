@@ -16,6 +16,21 @@ const BALL: &str = "include \"std/scene.pcad\" as scene;
     observe scene.contour(view, size = 96) = photo as picture;
     infer { warmup 60 { drift(one(@**)); } repeat 60 { drift(one(@**)); collect x, size; } }";
 
+/// A ball where the picture suggests one. [`DISC`] is the outline of that of `disc.png`.
+pub const PLACED: &str = "include \"std/scene.pcad\" as scene;
+    data photo: image \"the photograph\";
+    let places = scene.candidates(photo);
+    assume x ~ normal(0, 0.5);
+    let view = scene.render(scene.affine(translate = [x, 0, 0]) * scene.sphere(0.55));
+    observe scene.contour(view, size = 96) = photo as picture;
+    infer {
+      init(best_of(100));
+      warmup 60 { drift(@x); }
+      repeat 60 { drift(@x); collect x, len(places); }
+    }";
+pub const DISC: [[u32; 2]; 8] =
+    [[103, 68], [92, 79], [76, 79], [65, 68], [65, 52], [76, 41], [92, 41], [103, 52]];
+
 fn seen(name: &str) -> Folder {
     let f = Folder::new(name);
     f.write("ball.pcad", BALL).write("disc.png", png(disc(160, 120, 84.0, 60.0, 20.0)));
@@ -235,4 +250,30 @@ fn what_is_no_whole_run_is_said() {
             .err
             .contains("an evaluation has a run in each folder of a case")
     );
+}
+
+/// The first line of a run is that of its page, and in its record.
+#[test]
+fn a_page_begins_with_whether_the_object_was_found() {
+    let f = Folder::new("page-found");
+    f.write("placed.pcad", PLACED).write("disc.png", png(disc(160, 120, 84.0, 60.0, 20.0)));
+    let said = |run: &str, left: u32| {
+        let corner = |[x, y]: [u32; 2]| format!("{},{y}", x - left);
+        let outline = DISC.map(corner).join(" ");
+        let command = ["run", "placed.pcad", "--observe", "disc.png", "--chains", "2"];
+        let said = f.succeeds(&[&command[..], &["--outline", &outline, "--out", run]].concat());
+        let line = said.out.lines().next().unwrap().to_owned();
+        let record: serde_json::Value =
+            serde_json::from_str(&f.read(&format!("{run}/run.json"))).unwrap();
+        assert_eq!(record["found"]["text"], line.as_str());
+        let page = made_again(&f, run);
+        let below = page.split("</h1>\n").nth(1).unwrap();
+        assert_eq!(below.lines().next().unwrap(), format!("<p class=\"found\">{line}</p>"));
+        line
+    };
+    let line = said("here", 0);
+    assert!(line.starts_with("found: the object covers 9"), "{line}");
+    assert!(line.contains("% of the outline that was drawn, and chains agree on "), "{line}");
+    let line = said("beside", 60);
+    assert!(line.starts_with("not found: the object covers 0% of the outline"), "{line}");
 }

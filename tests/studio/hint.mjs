@@ -58,6 +58,10 @@ export async function hint({ open, step, out }) {
       "the run does not end",
       90,
     );
+    const found = await page.locator(".top-bar .found").innerText();
+    const whole = /^(found|perhaps found|not found): the object covers \d+% of the outlines/;
+    check(whole.test(found), `it says of the object: ${found}`);
+    await page.screenshot({ path: join(out, "hint-found.png") });
     await page.getByRole("tab", { name: "Runs" }).click();
     const command = await page.locator(".run-about pre.answer").innerText();
     const given = command.match(/--box '?([\d.,]+)/)?.[1]?.split(",").map(Number) ?? [];

@@ -137,6 +137,8 @@ export interface Run {
   error: string | null;
   begun: string | null;
   r_hat: number | null;
+  /** Whether the object of the photograph was found, in one sentence. */
+  found: string | null;
   session: number | null;
 }
 

@@ -31,6 +31,7 @@ export class TopBar {
   private readonly gear = button("Settings", () => this.settings.open());
   private readonly settings = new SettingsForm(this.gear);
   private readonly status = h("div", { class: "status" });
+  private readonly found = h("p", { class: "found", hidden: true });
   private readonly bar = h("progress", { max: 1, "aria-label": "Progress of the phase" });
 
   constructor(private readonly actions: Actions) {
@@ -51,6 +52,7 @@ export class TopBar {
       h("div", { class: "group" }, this.start, this.pause, this.goOn, this.stop, wrap),
       h("div", { class: "progress" }, this.status, this.bar),
       helpButton(),
+      this.found,
     );
     document.addEventListener("keydown", (event) => {
       if (event.altKey && event.code === "KeyR") {
@@ -130,6 +132,8 @@ export class TopBar {
     if (run && run.done !== null && run.done !== undefined) this.bar.value = run.done;
     else this.bar.removeAttribute("value");
     fill(this.status, ...(run ? statusOf(run) : ["No run yet"]));
+    this.found.textContent = run?.found ?? "";
+    this.found.hidden = !run?.found;
     const failed = run?.error ? `${run.run} ${run.error}` : "";
     if (failed === this.failed) return;
     this.failed = failed;

@@ -5,9 +5,12 @@
 
 use crate::failure::{Failure, plain};
 use crate::files::write_in;
+use crate::inputs::Ready;
 use crate::progress::Ending;
 use crate::reopening::seen::show_seen;
 use crate::scene;
+use crate::verdict::Judgement;
+use crate::watched::Watched;
 use image::GrayImage;
 use pcadlang_engine::lang::value::Located;
 use pcadlang_engine::trace::Trace;
@@ -18,7 +21,7 @@ use pcadlang_library::scene::{ImageValue, ViewValue};
 use pcadlang_report::RunDir;
 use pcadlang_report::pictures::{self, png};
 use pcadlang_scene::geom::{Mesh, Solid, glb, obj};
-use pcadlang_scene::render::{Camera, View};
+use pcadlang_scene::render::{Camera, Frame, View};
 use pcadlang_scene::vision::{Mask, Photo, npy};
 use pcadlang_workbench::session::{detected, exported, exported_operand, over};
 use std::sync::Arc;
@@ -99,15 +102,14 @@ fn draw(
     photo: Option<&Photo>,
     shown: &mut Shown,
 ) -> Result<(), Failure> {
-    let camera = view.camera();
-    let (width, height) = photo.map_or((camera.width, camera.height), |p| (p.width(), p.height()));
+    let (camera, (width, height)) = (view.camera(), extent(view, photo));
     let size = width.max(height);
     let frame = view.frame(size);
     let shape = [frame.height as usize, frame.width as usize];
     write_in(dir, "depth.npy", &npy::f32_array(&shape, frame.depth.iter().copied()))?;
     let normals = npy::f32_array(&[shape[0], shape[1], 3], frame.normal.iter().flatten().copied());
     write_in(dir, "normals.npy", &normals)?;
-    shown.mask = Mask::new(frame.width, frame.height, frame.mask().collect()).ok();
+    shown.mask = covered(&frame);
     let bytes = frame.mask().map(|m| if m { 255 } else { 0 }).collect();
     let encode = |p: Result<Vec<u8>, image::ImageError>| p.map_err(|e| plain(e.to_string()));
     if let Some(mask) = GrayImage::from_raw(frame.width, frame.height, bytes) {
@@ -118,7 +120,7 @@ fn draw(
     let lines = pictures::contours(frame.width, frame.height, &view.contours(size).slice());
     write_in(dir, "overlay.png", &encode(png(&over))?)?;
     write_in(dir, "contours.png", &encode(png(&lines))?)?;
-    let (spread, agreement) = frequency(chains, seed, 128);
+    let (spread, agreement) = frequency(chains.iter().map(|c| c.last.clone()), seed);
     shown.agreement = agreement;
     write_in(dir, "uncertainty.png", &encode(png(&spread))?)?;
     if let Some(mesh) = mesh(view.solid()) {
@@ -163,17 +165,45 @@ fn mesh(solid: &Solid) -> Option<Mesh> {
     }
 }
 
+/// Returns width and height of the picture in which a view is: those of the photograph, if any.
+fn extent(view: &View, photo: Option<&Photo>) -> (u32, u32) {
+    let camera = view.camera();
+    photo.map_or((camera.width, camera.height), |p| (p.width(), p.height()))
+}
+
+/// Returns the pixels that the object covers.
+fn covered(frame: &Frame) -> Option<Mask> {
+    Mask::new(frame.width, frame.height, frame.mask().collect()).ok()
+}
+
+/// Judges a run under way by its best state and, for the chains' last states, the latest
+/// ones that are kept: steps lie between them, at most an eighth of all.
+pub fn judged_so_far(ready: &Ready, watched: &Watched) -> Option<Judgement> {
+    let places = ready.image()?.known_places()?;
+    let (best, draws) = (watched.best.state()?, scene::predictive(0, 0));
+    let mut trace = scene::rebuilt(&ready.model, &best.choices, draws).ok()?;
+    let view = scene::view(&mut trace, draws, None)?;
+    let (width, height) = extent(&view, ready.photo());
+    let object = covered(&view.frame(width.max(height)))?;
+    let chains = 0..watched.memories.len();
+    let states = chains.filter_map(|chain| watched.trajectory.of_chain(chain).pop());
+    let last = states.filter_map(|state| scene::loaded(&ready.model, &state.trace).ok());
+    Judgement::of(&object, &places, frequency(last, 0).1)
+}
+
+/// The resolution at which the agreement of chains is measured: pixels along the longer side.
+const AGREEMENT: u32 = 128;
+
 /// Counts how many of the chains' last states cover each pixel, and returns how far
 /// several states cover the same pixels.
-fn frequency(chains: &[ChainResult], seed: u64, size: u32) -> (GrayImage, Option<f64>) {
+fn frequency(last: impl Iterator<Item = Trace>, seed: u64) -> (GrayImage, Option<f64>) {
     let mut counts: Vec<u32> = Vec::new();
     let (mut width, mut height, mut of) = (1, 1, 0);
-    for c in chains {
-        let mut trace = c.last.clone();
+    for mut trace in last {
         let Some(view) = scene::view(&mut trace, scene::predictive(seed, 1), None) else {
             continue;
         };
-        let frame = view.frame(size);
+        let frame = view.frame(AGREEMENT);
         (width, height) = (frame.width, frame.height);
         counts.resize((width * height) as usize, 0);
         counts.iter_mut().zip(frame.mask()).for_each(|(n, m)| *n += u32::from(m));

@@ -7,6 +7,11 @@ use pcadlang_scene::vision::Mask;
 use serde_json::{Value, json};
 use std::fmt;
 
+/// Returns the sentence of the verdict in a `run.json`, if it has one.
+pub fn sentence(run: &Value) -> Option<&str> {
+    run["found"]["text"].as_str()
+}
+
 /// An object was found if its fit, the overlap of outlines, and the agreement of chains are
 /// at least these.
 const FOUND: [f64; 3] = [0.89, 0.75, 0.8];
@@ -67,11 +72,11 @@ impl Judgement {
         Some(Judgement { verdict, source: place.source.clone(), fit, outlines, chains })
     }
 
-    /// Returns it for `run.json`.
+    /// Returns it for `run.json`, with the sentence that says it as `text`.
     pub fn json(&self) -> Value {
         json!({
             "verdict": self.verdict.name(), "source": self.source, "fit": self.fit,
-            "outlines": self.outlines, "chains": self.chains,
+            "outlines": self.outlines, "chains": self.chains, "text": self.to_string(),
         })
     }
 }

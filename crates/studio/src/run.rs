@@ -5,11 +5,13 @@ use super::runs::Slots;
 use pcadlang_inference::Progress;
 use pcadlang_report::RunDir;
 use pcadlang_runs::args::Job;
+use pcadlang_runs::best::judged_so_far;
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::inputs::{self, Ready};
 use pcadlang_runs::job::{self, CHECKPOINT, Interrupt, RunMode};
 use pcadlang_runs::reopening::reopened::Reopened;
 use pcadlang_runs::resume;
+use pcadlang_runs::verdict::sentence;
 use pcadlang_runs::watched::Watched;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -67,6 +69,8 @@ struct Inner {
     error: Option<String>,
     ready: Option<Arc<Ready>>,
     watched: Option<Arc<Watched>>,
+    /// What is said of the best state when the run was paused last.
+    paused: Option<String>,
     clock: Clock,
 }
 
@@ -122,7 +126,8 @@ impl Run {
         let error = record["error"].as_str().map(str::to_owned);
         let before = Duration::try_from_secs_f64(record["seconds"].as_f64().unwrap_or(0.0));
         let clock = Clock { before: before.unwrap_or_default(), since: None };
-        let inner = Inner { status, record, error, ready: None, watched: None, clock };
+        let inner =
+            Inner { status, record, error, ready: None, watched: None, paused: None, clock };
         Run {
             name: name.to_owned(),
             folder: folder.to_owned(),
@@ -187,8 +192,20 @@ impl Run {
         self.lock().watched.clone()
     }
 
-    /// Makes its chains wait.
+    /// Makes its chains wait, and judges their best state.
     pub fn pause(&self) -> Result<(), Failure> {
+        self.halt()?;
+        let (ready, watched) = {
+            let inner = self.lock();
+            (inner.ready.clone(), inner.watched.clone())
+        };
+        let both = ready.zip(watched);
+        let judged = both.and_then(|(ready, watched)| judged_so_far(&ready, &watched));
+        self.lock().paused = judged.map(|judged| judged.to_string());
+        Ok(())
+    }
+
+    fn halt(&self) -> Result<(), Failure> {
         let mut inner = self.lock();
         match inner.status {
             RunStatus::Paused => {}
@@ -344,6 +361,11 @@ impl Run {
             "r_hat": record["r_hat_max"],
             "session": self.session,
         });
+        let found = match inner.status {
+            RunStatus::Paused => inner.paused.as_deref(),
+            _ => sentence(record),
+        };
+        out["found"] = json!(found);
         let more = match &inner.watched {
             Some(w) => live(w, inner.status, chains.unwrap_or(1), elapsed, limit),
             None => {

@@ -1,6 +1,8 @@
 //! Runs under the studio: paused, stopped, resumed, many at once, and after a crash.
 
 use super::client::Studio;
+use crate::common::folder::{disc, png};
+use crate::report::{DISC, PLACED};
 use assert_cmd::Command;
 use serde_json::json;
 use std::time::Duration;
@@ -104,6 +106,35 @@ fn a_run_is_paused_stopped_and_goes_on() {
     let more = page.wait("runs/slow", &["stopped"]);
     assert!(more["draws"].as_u64() > stopped["draws"].as_u64(), "{more} {stopped}");
     page.ask("remove", json!({ "run": "runs/slow" }));
+}
+
+/// A paused run says whether the object was found, and an ended one says what its record does.
+#[test]
+fn a_run_says_whether_it_found_the_object() {
+    let s = Studio::new(&[]);
+    std::fs::write(s.folder.join("placed.pcad"), PLACED).unwrap();
+    std::fs::write(s.folder.join("disc.png"), png(disc(160, 120, 84.0, 60.0, 20.0))).unwrap();
+    let mut page = s.page();
+    let opened = page.ask("open", json!({ "program": "placed.pcad", "observe": ["disc.png"] }));
+    let id = &opened["session"];
+    page.ask("hint", json!({ "session": id, "hint": { "outline": DISC } }));
+    let settings = json!({ "chains": 2, "steps": 100_000_000 });
+    let begun = page.ask("run", json!({ "session": id, "settings": settings }));
+    assert_eq!(begun["found"], json!(null));
+    while page.wait("runs/placed", &["running"])["draws"].as_u64() < Some(20) {}
+    let is_found = |run: &serde_json::Value| {
+        let said = run["found"].as_str().unwrap_or_default();
+        said.starts_with("found: the object covers 9") && said.contains("chains agree on")
+    };
+    let paused = page.ask("pause", json!({ "run": "runs/placed" }));
+    assert!(is_found(&paused), "{paused}");
+    assert_eq!(page.wait("runs/placed", &["paused"])["found"], paused["found"]);
+    assert_eq!(page.ask("go_on", json!({ "run": "runs/placed" }))["found"], json!(null));
+    page.ask("stop", json!({ "run": "runs/placed" }));
+    let ended = page.wait("runs/placed", &["stopped"]);
+    let record = std::fs::read(s.folder.join("runs/placed/run.json")).unwrap();
+    let record: serde_json::Value = serde_json::from_slice(&record).unwrap();
+    assert!(is_found(&ended) && ended["found"] == record["found"]["text"], "{ended}");
 }
 
 #[test]

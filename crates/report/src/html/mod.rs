@@ -18,6 +18,8 @@ use std::fmt::Write;
 pub struct Page<'a> {
     /// The program's name.
     pub title: &'a str,
+    /// Whether the object of the photograph was found, and why, in one sentence.
+    pub found: Option<&'a str>,
     /// Facts shown below the title, such as the date and the time taken.
     pub facts: Vec<String>,
     /// The command that repeats the run; empty if it is not known.
@@ -73,6 +75,9 @@ pub fn page(p: &Page) -> String {
          <meta name=\"color-scheme\" content=\"light dark\"><title>{title}</title>\
          <style>\n{STYLE}</style>\n<h1>{title}</h1>\n"
     );
+    if let Some(found) = p.found {
+        let _ = writeln!(s, "<p class=\"found\">{}</p>", escaped(found));
+    }
     if !p.facts.is_empty() {
         let facts: Vec<String> = p.facts.iter().map(|f| escaped(f)).collect();
         let _ = writeln!(s, "<p class=\"facts\">{}</p>", facts.join(" · "));

@@ -16,6 +16,7 @@ fn the_page_is_whole_and_escapes_what_it_quotes() {
     let picture = Figure { caption: text, file: vec![1, 2, 3], lines: false };
     let page = page(&Page {
         title: text,
+        found: Some(text),
         facts: vec![text.into()],
         command: text,
         program: text,
@@ -45,7 +46,7 @@ fn the_page_is_whole_and_escapes_what_it_quotes() {
     );
     assert_eq!(
         page.matches("&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;s&quot;").count(),
-        14
+        15
     );
     assert_eq!(
         page.matches("data:image/png;base64,AQID").count(),
@@ -63,6 +64,17 @@ fn the_page_is_whole_and_escapes_what_it_quotes() {
             page.matches(&format!("<{tag}>")).count() + page.matches(&format!("<{tag} ")).count();
         assert_eq!(opened, page.matches(&format!("</{tag}>")).count(), "{tag}");
     }
+}
+
+/// Who reads one line reads whether the object was found.
+#[test]
+fn the_verdict_is_the_first_line() {
+    let facts = vec!["2 chains".into()];
+    let all = Page { title: "cup", found: Some("found: <95%>"), facts, ..Page::default() };
+    let text = page(&all);
+    let below = text.split("</h1>\n").nth(1).unwrap();
+    assert!(below.starts_with("<p class=\"found\">found: &lt;95%&gt;</p>\n<p class=\"facts\">"));
+    assert!(!page(&Page { found: None, ..all }).contains("class=\"found\""));
 }
 
 /// Every part has a link, and every link has a target.

@@ -6,6 +6,7 @@ use crate::failure::{Failure, plain};
 use crate::files::write_in;
 use crate::reopening::reopened::readable;
 use crate::reopening::reopened::{PROGRAM, quoted};
+use crate::verdict::sentence;
 use crate::watched::ROOM;
 use crate::{files, places, resume};
 use image::RgbImage;
@@ -64,6 +65,7 @@ pub fn write_page(
     let program = std::fs::read(dir.file(PROGRAM)).unwrap_or_default();
     let html = page(&Page {
         title: text(&run["program"]),
+        found: sentence(run),
         facts: facts(run),
         command: &command(run),
         settings: settings(run),
