@@ -99,9 +99,10 @@ impl Program {
     }
 
     /// Says where the object is in the photograph that was observed, in its pixels: `mask`, a path
-    /// or an array of height x width truth values; `outline`, at least three corners [x, y]; `box`,
-    /// [x, y, width, height]; `axis`, (foot, top, width) with two ends [x, y]; `at` and `not_`,
-    /// positions [x, y] on it and beside it. What is left out is not pointed out.
+    /// or an array of height x width truth values; `outline`, at least three positions [x, y], from
+    /// six on joined by a smooth curve; `box`, [x, y, width, height]; `axis`, (foot, top, width) with
+    /// two ends [x, y]; `at` and `not_`, positions [x, y] on it and beside it. What is left out is
+    /// not pointed out.
     #[pyo3(signature = (
         *, mask = None, outline = Vec::new(), r#box = None, axis = None, at = Vec::new(), not_ = Vec::new()
     ))]

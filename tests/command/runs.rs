@@ -68,6 +68,30 @@ fn draws(f: &Folder, dir: &str, chains: usize) -> Vec<String> {
     (1..=chains).map(chain).collect()
 }
 
+/// Columns of `log_lik` are of the same observations in all chains, or are left out, so that
+/// nothing compares models by columns that mean different things.
+#[test]
+fn chains_that_observe_different_things_have_no_log_lik() {
+    let f = Folder::new("observing");
+    let program = |n: &str| {
+        format!(
+            "assume n ~ uniform_discrete(1, 6); assume x ~ normal(0, 1);
+             for i in 0 .. {n} {{ observe normal(x, 1) = i; }}
+             infer {{ repeat 10 {{ mh(@x); collect n, x; }} }}"
+        )
+    };
+    let observed = |name: &str, n: &str| {
+        f.write(&format!("{name}.pcad"), program(n));
+        f.succeeds(&["run", &format!("{name}.pcad"), "--seed", "1", "--quiet", "--out", name]);
+        let names = draws(&f, name, 4).into_iter().map(|c| c.lines().next().unwrap().to_owned());
+        let names: Vec<String> = names.collect();
+        assert!(names.iter().all(|n| n == &names[0]), "{names:?}");
+        (names[0].contains("log_lik.1"), f.exists(&format!("{name}/inference.zarr/log_likelihood")))
+    };
+    assert_eq!(observed("same", "3"), (true, true));
+    assert_eq!(observed("other", "n"), (false, false));
+}
+
 /// The shipped program on a small picture gives the same draws, bit for bit, on any
 /// number of threads, and with and without incremental updates.
 #[test]

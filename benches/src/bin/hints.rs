@@ -283,7 +283,7 @@ fn show_places(case: &Case, kind: &str) -> Result<(), String> {
         let truth = |m: &Mask| m.overlap(&case.mask);
         let overlaps: Vec<f64> = p.masks.iter().map(truth).collect();
         let apart = match &p.masks[..] {
-            [a, b] => a.overlap(b),
+            [a, b, ..] => a.overlap(b),
             _ => 1.0,
         };
         println!("  {:12} {:.3} {overlaps:.2?} {apart:.2} {:.0?}", p.source, p.score, p.bounds);

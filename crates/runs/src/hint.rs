@@ -16,8 +16,8 @@ pub struct HintArgs {
     /// .npy array, of the photograph's proportions
     #[arg(long, value_name = "FILE")]
     pub mask: Option<PathBuf>,
-    /// The corners of an outline around the object, at least three, in pixels of the
-    /// photograph
+    /// Positions around the object, at least three, in pixels of the photograph: up to five are
+    /// the corners of a polygon, six or more are joined by a smooth curve
     #[arg(long, value_name = "X,Y", num_args = 1.., value_parser = corners)]
     pub outline: Vec<Corners>,
     /// A box around the object, in pixels of the photograph

@@ -37,9 +37,9 @@ pub struct Judgement {
     pub verdict: Verdict,
     /// What points to the place where the object was fitted ([`Place::source`]).
     pub source: String,
-    /// The mean overlap (intersection over union) of the object with the outlines there.
+    /// The overlap (intersection over union) of the object with the nearest outline there.
     pub fit: f64,
-    /// The overlap of the outlines with each other; 1 for a single one.
+    /// The overlap of the first two outlines with each other; 1 for a single one.
     pub outlines: f64,
     /// The fraction of covered pixels on which the chains' last states agree.
     pub chains: Option<f64>,
@@ -49,14 +49,10 @@ impl Judgement {
     /// Judges the pixels of the best scene by the places where the object may be; `None` if
     /// nothing suggests an outline.
     pub fn of(object: &Mask, places: &[Place], chains: Option<f64>) -> Option<Judgement> {
-        let fit = |p: &Place| {
-            let all = p.masks.iter().map(|m| m.overlap(object));
-            all.sum::<f64>() / p.masks.len() as f64
-        };
-        let outlined = places.iter().filter(|p| !p.masks.is_empty());
-        let (place, fit) = outlined.map(|p| (p, fit(p))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let fits = places.iter().flat_map(|p| p.masks.iter().map(move |m| (p, m.overlap(object))));
+        let (place, fit) = fits.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let outlines = match &place.masks[..] {
-            [a, b] => a.overlap(b),
+            [a, b, ..] => a.overlap(b),
             _ => 1.0,
         };
         let agreement = chains.unwrap_or(1.0);

@@ -3,7 +3,7 @@
 
 use super::hint::{HINT, asked};
 use super::observed::MaskValue;
-use super::places::Place;
+use super::places::{Place, PlaceAxis};
 use super::seeing::camera;
 use super::{CAMERA, IMAGE, ImageValue, native};
 use glam::DVec3;
@@ -11,7 +11,7 @@ use pcadlang_engine::lang::builtins::{Row, Type, arg, int, opt};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::render::{Camera, Projection};
 use pcadlang_scene::vision::Mask;
-use pcadlang_scene::vision::candidates::{Axis, CandidateOptions, tilts};
+use pcadlang_scene::vision::candidates::{CandidateOptions, tilts};
 use std::sync::Arc;
 
 pub(super) const TABLE: &[Row] = &[native(
@@ -41,8 +41,8 @@ pub(super) const TABLE: &[Row] = &[native(
      that are nearly mirror-symmetric. Each is a record: `score`, its probability; `source`, \
      \"drawn\", \"axis\", \"box\", the class that the detector sees, or \"region\"; `box`, [x, y, \
      width, height] in pixels, or [] if none points to it; `masks`, the outline that was drawn, or \
-     two guesses of it, by a symmetric outline and by a graph cut, or none for a region; `axes`, \
-     records with a `weight`, all of a place adding up to 1; `symmetry`, 0 to 1; the ends `foot` and \
+     guesses of it, the best symmetric one, a graph cut, then others; `axes`, records with a \
+     `weight`, all of a place adding up to 1; `mask`, the index of the outline; `symmetry`, 0 to 1; the ends `foot` and \
      `top`, in a fronto-parallel plane at about the distance of the origin; their distance `length`; \
      the unit vectors `along`, from foot to top, and `toward` the camera, which is at `distance`; \
      `widths`, 24 half-widths from foot to top; `tilts`, 80 angles by which the axis may be turned \
@@ -79,7 +79,7 @@ pub(super) const TABLE: &[Row] = &[native(
 /// Converts a place to a record; `scale` is the size of a photograph's pixel in pixels of
 /// the camera.
 fn value(p: &Place, camera: &Camera, scale: [f64; 2]) -> Value {
-    let axes = p.axes.iter().map(|(a, weight)| axis(a, *weight, camera, scale)).collect();
+    let axes = p.axes.iter().map(|a| axis(a, camera, scale)).collect();
     let mask = |m: &Mask| Value::object(MaskValue::new(m.clone()));
     Value::record([
         ("score", Value::Num(p.score)),
@@ -90,7 +90,8 @@ fn value(p: &Place, camera: &Camera, scale: [f64; 2]) -> Value {
     ])
 }
 
-fn axis(a: &Axis, weight: f64, camera: &Camera, scale: [f64; 2]) -> Value {
+fn axis(placed: &PlaceAxis, camera: &Camera, scale: [f64; 2]) -> Value {
+    let a = &placed.axis;
     // The midpoint of the axis is placed at the depth of the origin; the axis lies in the
     // plane through it that faces the camera.
     let depth = (-camera.eye).dot(camera.forward).max(Camera::NEAR);
@@ -120,7 +121,8 @@ fn axis(a: &Axis, weight: f64, camera: &Camera, scale: [f64; 2]) -> Value {
     };
     let vector = |v: DVec3| Value::array(v.to_array().to_vec());
     Value::record([
-        ("weight", Value::Num(weight)),
+        ("weight", Value::Num(placed.weight)),
+        ("mask", Value::Num(placed.mask as f64)),
         ("symmetry", Value::Num(a.symmetry)),
         ("foot", vector(foot)),
         ("top", vector(top)),
@@ -137,6 +139,7 @@ fn axis(a: &Axis, weight: f64, camera: &Camera, scale: [f64; 2]) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pcadlang_scene::vision::candidates::Axis;
 
     /// A disc that faces the camera, far from the centre of the picture, is as long as it
     /// is wide in every direction.
@@ -159,7 +162,7 @@ mod tests {
             let (mx, my) = (0.5 * (foot[0] + top[0]), 0.5 * (foot[1] + top[1]));
             let width = ((x - mx) * uy - (y - my) * ux).abs() / f64::hypot(ux, uy);
             let seen = Axis { symmetry: 1.0, foot, top, widths: vec![width], rims: Vec::new() };
-            let made = axis(&seen, 1.0, &camera, [1.0, 1.0]);
+            let made = axis(&PlaceAxis { axis: seen, weight: 1.0, mask: 0 }, &camera, [1.0, 1.0]);
             let Value::Record(fields) = &made else { panic!("no record") };
             let number = |name: &str| match fields.get(name) {
                 Some(Value::Num(x)) => *x,

@@ -24,6 +24,9 @@ const SAME: f64 = 0.75;
 const REGION: f64 = 0.03;
 /// Each side of the picture that a box touches multiplies its weight by this.
 const CUT_OFF: f64 = 0.6;
+/// The overlap of a region's own box with one that points to a place, from which on the region
+/// is a guess of the outline there.
+const FILLS: f64 = 0.8;
 
 /// A place where an object may be.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,10 +38,22 @@ pub struct Place {
     pub source: String,
     /// Left, top, width and height, pixels of the photograph, if a box points to it.
     pub bounds: Option<[f64; 4]>,
-    /// Outlines: the one that the user drew, or guesses.
+    /// Outlines: the one that the user drew, or guesses; first of these the best symmetric
+    /// one and the graph cut.
     pub masks: Vec<Mask>,
-    /// Axes with their weights, which add up to 1.
-    pub axes: Vec<(Axis, f64)>,
+    /// Axes; their weights add up to 1.
+    pub axes: Vec<PlaceAxis>,
+}
+
+/// An axis that an object in a place may have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlaceAxis {
+    /// The axis, in pixels of the photograph.
+    pub axis: Axis,
+    /// Its probability.
+    pub weight: f64,
+    /// The index of the outline whose axis it is.
+    pub mask: usize,
 }
 
 impl Place {
@@ -48,21 +63,62 @@ impl Place {
         bounds: Option<[f64; 4]>,
         all: &[Guess],
     ) -> Place {
-        let first = |method| all.iter().find(|g| g.method == method).map(|g| g.mask.clone());
+        let by = |method| all.iter().filter(move |g| g.method == method);
+        let first = |method| by(method).next().map(|g| g.mask.clone());
         let masks = [Method::Symmetric, Method::Cut].into_iter().filter_map(first).collect();
-        // Each method has the same weight; later guesses and axes of one have half the
-        // weight of the one before.
-        let weighted = |method| {
-            let axes = all.iter().filter(move |g| g.method == method).flat_map(|g| &g.axes);
-            axes.enumerate().map(|(i, axis)| (axis.clone(), 0.5f64.powi(i as i32)))
+        let mut place = Place::outlined(source, score, bounds, masks);
+        for method in Method::ALL {
+            let axes = |g: &Guess| {
+                // Other guesses give axes for the outline most like them.
+                let nearest = place.nearest(&g.mask);
+                g.axes.iter().map(|a| (a.clone(), nearest)).collect::<Vec<_>>()
+            };
+            let axes = by(method).flat_map(axes).collect();
+            place.add(axes);
+        }
+        place
+    }
+
+    /// The index of the outline that overlaps a mask most.
+    fn nearest(&self, mask: &Mask) -> usize {
+        let overlaps = self.masks.iter().map(|m| m.overlap(mask)).enumerate();
+        overlaps.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i)
+    }
+
+    /// Adds the axes of a method. Each method has the same weight; later axes of one have half
+    /// the weight of the one before.
+    fn add(&mut self, axes: Vec<(Axis, usize)>) {
+        let total: f64 = (0..axes.len()).map(|i| 0.5f64.powi(i as i32)).sum();
+        let weighted = axes.into_iter().enumerate();
+        self.axes.extend(weighted.map(|(i, (axis, mask))| PlaceAxis {
+            axis,
+            weight: 0.5f64.powi(i as i32) / total,
+            mask,
+        }));
+    }
+
+    /// Adds the regions of a photograph of `size` pixels that fill the box, as guesses.
+    fn with_regions(mut self, all: &[Candidate], size: [f64; 2]) -> Place {
+        let fills = |c: &&Candidate| {
+            let scale = [size[0] / f64::from(c.mask.width()), size[1] / f64::from(c.mask.height())];
+            let seen = c.mask.bounds().map(|b| [0, 1, 2, 3].map(|k| b[k] * scale[k % 2]));
+            let given = self.bounds.map(|[x, y, w, h]| [x, y, x + w, y + h]);
+            given.zip(seen).is_some_and(|(a, b)| overlap(a, b) > FILLS)
         };
-        let axes = Method::ALL.into_iter().flat_map(weighted).collect();
-        Place { score, source: source.into(), bounds, masks, axes: normalised(axes) }
+        let filling: Vec<&Candidate> = all.iter().filter(fills).collect();
+        let mut axes = Vec::new();
+        for c in filling {
+            axes.extend(c.axes.iter().map(|a| (a.clone(), self.masks.len())));
+            self.masks.push(c.mask.clone());
+        }
+        self.add(axes);
+        self.axes = normalised(self.axes);
+        self
     }
 
     fn region(c: &Candidate, score: f64) -> Place {
-        let axes = c.axes.iter().cloned().zip([0.8, 0.2]).collect();
-        Place { masks: vec![c.mask.clone()], axes: normalised(axes), ..Place::anywhere(score) }
+        let axes = of_mirrors(c.axes.clone());
+        Place { masks: vec![c.mask.clone()], axes, ..Place::anywhere(score) }
     }
 
     /// A place with outlines, and no axes yet.
@@ -81,9 +137,15 @@ impl Place {
     }
 }
 
-fn normalised(mut axes: Vec<(Axis, f64)>) -> Vec<(Axis, f64)> {
-    let total: f64 = axes.iter().map(|(_, w)| w).sum();
-    axes.iter_mut().for_each(|(_, w)| *w /= total);
+/// Returns the axes of the only outline of a place: its best mirror and the next one.
+fn of_mirrors(axes: Vec<Axis>) -> Vec<PlaceAxis> {
+    let weighted = axes.into_iter().zip([0.8, 0.2]);
+    normalised(weighted.map(|(axis, weight)| PlaceAxis { axis, weight, mask: 0 }).collect())
+}
+
+fn normalised(mut axes: Vec<PlaceAxis>) -> Vec<PlaceAxis> {
+    let total: f64 = axes.iter().map(|a| a.weight).sum();
+    axes.iter_mut().for_each(|a| a.weight /= total);
     axes
 }
 
@@ -139,27 +201,31 @@ pub(super) fn places(
     options: &CandidateOptions,
 ) -> Result<Vec<Place>, Fault> {
     if let Some(mask) = hint.drawn(photo.width(), photo.height()) {
-        let axes = from_mask(photo, &mask).into_iter().zip([0.8, 0.2]).collect();
-        let drawn = Place::outlined("drawn", 1.0, None, vec![mask]);
-        return Ok(vec![Place { axes: normalised(axes), ..drawn }]);
+        let axes = of_mirrors(from_mask(photo, &mask));
+        return Ok(vec![Place { axes, ..Place::outlined("drawn", 1.0, None, vec![mask]) }]);
     }
+    let found_regions = || image.regions(photo, options);
+    let size = [photo.width(), photo.height()].map(f64::from);
     if hint.axis.is_some() || hint.bounds.is_some() {
         let source = if hint.axis.is_some() { "axis" } else { "box" };
         let all = image.guesses(photo, hint)?;
-        return Ok(vec![Place::guessed(source, 1.0, hint.bounds, &all)]);
+        let place = Place::guessed(source, 1.0, hint.bounds, &all);
+        let seen = if hint.bounds.is_some() { found_regions()? } else { Arc::default() };
+        return Ok(vec![place.with_regions(&seen, size)]);
     }
     let boxes = boxes(photo, &found(image, &VIEWS)?, hint);
+    let seen_regions = found_regions()?;
     let seen = boxes.iter().map(|(o, weight)| {
         let bounds = Some(sized(o.bounds));
         let all = image.guesses(photo, &Hint { bounds, ..hint.clone() })?;
-        Ok(Place::guessed(o.class, *weight, bounds, &all))
+        Ok(Place::guessed(o.class, *weight, bounds, &all).with_regions(&seen_regions, size))
     });
     let mut all: Vec<Place> = seen.collect::<Result<_, Fault>>()?;
     if !hint.at.is_empty() && !all.is_empty() {
         normalise(&mut all);
         return Ok(all);
     }
-    all.extend(regions(&meant(image.regions(photo, options)?.to_vec(), photo, hint)));
+    all.extend(regions(&meant(seen_regions.to_vec(), photo, hint)));
     normalise(&mut all);
     Ok(all)
 }

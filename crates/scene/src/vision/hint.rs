@@ -153,13 +153,8 @@ impl Hint {
     /// of the drawn pixels in a photograph of this size.
     pub fn around(&self, width: u32, height: u32) -> Option<[f64; 4]> {
         self.bounds.or_else(|| {
-            let drawn = self.drawn(width, height)?;
-            let row = drawn.width() as usize;
-            let on = || (0..drawn.data().len()).filter(|i| drawn.data()[*i]);
-            let (left, right) = (on().map(|i| i % row).min()?, on().map(|i| i % row).max()?);
-            let (top, bottom) = (on().next()? / row, on().next_back()? / row);
-            let (w, h) = (right + 1 - left, bottom + 1 - top);
-            Some([left, top, w, h].map(|n| n as f64))
+            let [left, top, right, bottom] = self.drawn(width, height)?.bounds()?;
+            Some([left, top, right - left, bottom - top])
         })
     }
 }

@@ -47,6 +47,16 @@ impl Mask {
         self.data[pixel(y, self.height) * self.width as usize + pixel(x, self.width)]
     }
 
+    /// Returns left, top, right and bottom of the object, in its own pixels; `None` if it is
+    /// empty.
+    pub fn bounds(&self) -> Option<[f64; 4]> {
+        let row = self.width as usize;
+        let on = || (0..self.data.len()).filter(|i| self.data[*i]);
+        let (left, right) = (on().map(|i| i % row).min()?, on().map(|i| i % row).max()?);
+        let (top, bottom) = (on().next()? / row, on().next_back()? / row);
+        Some([left, top, right + 1, bottom + 1].map(|n| n as f64))
+    }
+
     /// Returns the intersection over union with another mask at this one's size; 0 if both
     /// are empty.
     pub fn overlap(&self, other: &Mask) -> f64 {
