@@ -68,6 +68,7 @@ impl ChainDraws {
     }
 
     /// Drops the log densities of single observed values.
+    #[doc(hidden)]
     pub fn drop_pointwise(&mut self) {
         let others = self.columns.iter().filter(|c| c.name != POINTWISE);
         self.widen(others.cloned().collect());
