@@ -204,7 +204,7 @@ mod tests {
     fn few_corners_are_a_polygon_and_more_a_curve() {
         let circle = |n: usize| {
             let at = |i| libm::sincos(i as f64 / n as f64 * std::f64::consts::TAU);
-            (0..n).map(|i| at(i)).map(|(s, c)| [50.0 + 40.0 * c, 50.0 + 40.0 * s]).collect()
+            (0..n).map(at).map(|(s, c)| [50.0 + 40.0 * c, 50.0 + 40.0 * s]).collect()
         };
         let area = |n: usize| {
             let hint = Hint { outline: circle(n), ..Hint::default() };
