@@ -84,7 +84,7 @@ def test_hints_reach_the_program() -> None:
     with pytest.raises(ValueError, match="proportions"):
         program.hint(mask=mask.T)
     with pytest.raises(TypeError, match="truth values"):
-        program.hint(mask=np.zeros((20, 30)))
+        program.hint(mask=np.zeros((20, 30)))  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="needs a photograph"):
         pcadlang.Program.parse(text).hint(box=[1, 2, 3, 4])
 
