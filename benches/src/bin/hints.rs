@@ -107,19 +107,6 @@ fn read_mask(path: &Path) -> Result<Mask, String> {
     mask::decode(&bytes, &Limits::default()).map_err(|e| e.to_string())
 }
 
-/// Left, top, width and height of a mask, pixels.
-fn bounds(m: &Mask) -> [f64; 4] {
-    let (mut least, mut most) = ([u32::MAX; 2], [0; 2]);
-    for (i, _) in m.data().iter().enumerate().filter(|(_, on)| **on) {
-        let at = [i as u32 % m.width(), i as u32 / m.width()];
-        for k in 0..2 {
-            least[k] = least[k].min(at[k]);
-            most[k] = most[k].max(at[k] + 1);
-        }
-    }
-    [least[0], least[1], most[0] - least[0], most[1] - least[1]].map(f64::from)
-}
-
 /// The outline of the component of the first pixel of a mask: the corners between pixels,
 /// with the object on the right.
 fn outline(m: &Mask) -> Vec<[f64; 2]> {
@@ -153,7 +140,8 @@ fn hint(kind: &str, case: &Case) -> Result<Vec<String>, String> {
     let site = case.name.bytes().fold(7, |h: u64, b| h.wrapping_mul(31).wrapping_add(b.into()));
     let mut rng: Stream = StreamKey::new(1, 0, Purpose::TRUTH).stream(0, site, 0);
     let m = &case.mask;
-    let [x, y, w, h] = bounds(m);
+    let [x, y, right, bottom] = m.bounds().ok_or("an empty mask")?;
+    let (w, h) = (right - x, bottom - y);
     let point = |[x, y]: [f64; 2]| format!("{x:.1},{y:.1}");
     Ok(match kind {
         "none" => Vec::new(),
@@ -278,7 +266,7 @@ fn show_places(case: &Case, kind: &str) -> Result<(), String> {
         }
     }
     let places = image.places(&CandidateOptions::default(), &wanted);
-    println!("{}: box {:.0?}, {wanted:?}", case.name, bounds(&case.mask));
+    println!("{}: box {:.0?}, {wanted:?}", case.name, case.mask.bounds());
     for p in places.map_err(|e| e.message)?.iter().take(24) {
         let truth = |m: &Mask| m.overlap(&case.mask);
         let overlaps: Vec<f64> = p.masks.iter().map(truth).collect();

@@ -25,16 +25,6 @@ const OFF: f64 = 0.08;
 const AXIS_OFF: f64 = 0.03;
 const TRIED: u64 = 5;
 
-/// Left, top, right and bottom of a mask.
-fn bounds(mask: &Mask) -> [f64; 4] {
-    let mut b = [f64::INFINITY, f64::INFINITY, 0.0, 0.0];
-    for p in (0..mask.data().len()).filter(|p| mask.data()[*p]) {
-        let (i, j) = ((p as u32 % mask.width()) as f64, (p as u32 / mask.width()) as f64);
-        b = [b[0].min(i), b[1].min(j), b[2].max(i + 1.0), b[3].max(j + 1.0)];
-    }
-    b
-}
-
 /// A number in -1..1 that is the same each time.
 fn noise(seed: u64) -> f64 {
     let x = (seed + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -73,7 +63,7 @@ fn look(folder: &Path) -> Result<[Vec<[f64; NAMES.len()]>; 3], String> {
     let (limits, image, truth) = (Limits::default(), read("image.png")?, read("mask.png")?);
     let photo = photo::decode(&image, &limits).map_err(|e| e.to_string())?;
     let truth = mask::decode(&truth, &limits).map_err(|e| e.to_string())?;
-    let [x0, y0, x1, y1] = bounds(&truth);
+    let [x0, y0, x1, y1] = truth.bounds().ok_or("an empty mask")?;
     let hint = |off: [f64; 4]| {
         let (w, h) = (x1 - x0, y1 - y0);
         let (left, right) = (x0 + OFF * w * off[0], x1 + OFF * w * off[1]);

@@ -13,8 +13,6 @@ use pcadlang_scene::vision::{Hint, Mask, Photo};
 
 /// The maximum longer side of masks, pixels.
 const LARGEST: u32 = 256;
-/// The maximum number of guesses that are shown.
-const SHOWN: usize = 2;
 
 impl ImageValue {
     /// Returns the place in the photograph that a hint points out, with guesses of its outline,
@@ -61,9 +59,7 @@ impl ImageValue {
         let hint = Hint { bounds, ..hint.clone() };
         if !quick {
             let all = self.guesses(photo, &hint)?;
-            let mut place = Place::guessed(source, score, bounds, &all);
-            place.masks.truncate(SHOWN);
-            return Ok(Some(place));
+            return Ok(Some(Place::guessed(source, score, bounds, &all)));
         }
         let ellipse = guesses(photo, &hint, &[Method::Ellipse]);
         let masks = ellipse.into_iter().take(1).map(|g| g.mask).collect();
