@@ -3,9 +3,10 @@
 use clap::Args;
 use image::RgbImage;
 use pcadlang_detectors::objects::{self, FoundObject, ObjectOptions, View};
-use pcadlang_detectors::people::{FindOptions, Person, json};
+use pcadlang_detectors::people::{FindOptions, Person, Search, json};
 use pcadlang_report::pictures::{DETECTED, dots, limbs, picture_size, png};
 use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_runs::hint::rectangle;
 use pcadlang_runs::{files, inputs};
 use pcadlang_scene::vision::Photo;
 use std::path::{Path, PathBuf};
@@ -35,8 +36,14 @@ pub struct Detect {
     /// The number of views of the picture: with increasing padding, each also mirrored
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(2..=8))]
     pub views: u32,
+    /// Look only for the person who fills this box, in pixels of the photograph
+    #[arg(
+        long = "box", value_name = "X,Y,W,H", allow_hyphen_values = true,
+        value_parser = rectangle, conflicts_with = "objects"
+    )]
+    pub bounds: Option<[f64; 4]>,
     /// The maximum number of people per view
-    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100))]
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100))]
     pub people: u32,
     /// The number of threads; 0 means all cores
     #[arg(long, default_value_t = 0)]
@@ -102,8 +109,15 @@ pub fn detect(a: &Detect) -> Result<(), Failure> {
 
 fn detect_people(a: &Detect, photo: &Photo) -> Result<(), Failure> {
     let options = FindOptions { views: a.views, most: a.people as usize, ..FindOptions::default() };
+    let objects = objects::networks::finder()
+        .map_err(plain)?
+        .find(photo, View::WHOLE, &ObjectOptions { most: usize::MAX, ..ObjectOptions::default() })
+        .map_err(|e| plain(e.to_string()))?;
+    let search = a
+        .bounds
+        .map_or(Search::Everywhere(&objects), |[x, y, w, h]| Search::Within([x, y, x + w, y + h]));
     let people = inputs::finder(a.models.as_deref())?
-        .find(photo, &options, a.threads)
+        .find(photo, search, &options, a.threads)
         .map_err(|e| plain(e.to_string()))?;
     let size = (photo.width(), photo.height());
     let file = match a.format {

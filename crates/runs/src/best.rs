@@ -3,9 +3,11 @@
 //!
 //! The run itself is in `job`.
 
+use crate::args::Job;
 use crate::failure::{Failure, plain};
 use crate::files::write_in;
 use crate::inputs::Ready;
+use crate::people;
 use crate::progress::Ending;
 use crate::reopening::seen::show_seen;
 use crate::scene;
@@ -178,13 +180,14 @@ fn covered(frame: &Frame) -> Option<Mask> {
 
 /// Judges a run under way by its best state and, for the chains' last states, the latest
 /// ones that are kept: steps lie between them, at most an eighth of all.
-pub fn judged_so_far(ready: &Ready, watched: &Watched) -> Option<Judgement> {
-    let places = ready.image()?.known_places()?;
+pub fn judged_so_far(job: &Job, ready: &Ready, watched: &Watched) -> Option<Judgement> {
+    let places = ready.image()?.known_places();
     let (best, draws) = (watched.best.state()?, scene::predictive(0, 0));
     let mut trace = scene::rebuilt(&ready.model, &best.choices, draws).ok()?;
     let view = scene::view(&mut trace, draws, None)?;
     let (width, height) = extent(&view, ready.photo());
     let object = covered(&view.frame(width.max(height)))?;
+    let Some(places) = places else { return people::judged(job, ready, &object) };
     let chains = 0..watched.memories.len();
     let states = chains.filter_map(|chain| watched.trajectory.of_chain(chain).pop());
     let last = states.filter_map(|state| scene::loaded(&ready.model, &state.trace).ok());

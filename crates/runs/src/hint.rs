@@ -164,7 +164,10 @@ fn corners(text: &str) -> Result<Corners, String> {
 }
 
 /// Parses `X,Y,W,H`.
-fn rectangle(text: &str) -> Result<[f64; 4], String> {
+///
+/// # Errors
+/// If it is not four numbers, or the width or height is not above 0.
+pub fn rectangle(text: &str) -> Result<[f64; 4], String> {
     match numbers(text).as_deref() {
         Ok(&[x, y, w, h]) if w > 0.0 && h > 0.0 => Ok([x, y, w, h]),
         _ => Err("expected four numbers X,Y,W,H with positive width and height".into()),

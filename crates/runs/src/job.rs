@@ -19,7 +19,7 @@ use crate::reopening::page::write_page;
 use crate::reopening::reopened::{PROGRAM, TRACES, TRAJECTORY, arguments};
 use crate::reopening::{reopened, seen};
 use crate::stream::Streamed;
-use crate::verdict::Judgement;
+use crate::verdict::{Judgement, Verdict};
 use crate::watched::Watched;
 use crate::{files, inputs};
 use pcadlang_inference::RunOptions;
@@ -186,8 +186,15 @@ fn recorded(record: &Map<String, Value>, state: &str, more: Value) -> Value {
 }
 
 fn write_run(dir: &RunDir, run: &Value) -> Result<(), Failure> {
-    write_in(dir, "run.json", &serde_json::to_vec_pretty(run).unwrap_or_default())
+    write_json(dir, "run.json", run)
 }
+
+fn write_json(dir: &RunDir, name: &str, value: &Value) -> Result<(), Failure> {
+    write_in(dir, name, &serde_json::to_vec_pretty(value).unwrap_or_default())
+}
+
+/// The file of joints in the photograph.
+const KEYPOINTS: &str = "keypoints.json";
 
 /// Records in `run.json` that a run failed, and why.
 pub fn record_failure(
@@ -244,6 +251,15 @@ pub fn perform_watched(
 ) -> Result<Outcome, Failure> {
     write_record(dir, record, "running", json!({}))?;
     write_in(dir, PROGRAM, ready.model.text().as_bytes())?;
+    if let Some(nobody) = people::nobody(job, ready) {
+        let found = json!({ "found": nobody.json() });
+        write_json(dir, KEYPOINTS, &found)?;
+        let mut more =
+            json!({ "error": nobody.text, "seconds": ready.begun.elapsed().as_secs_f64() });
+        more["found"] = found["found"].clone();
+        write_record(dir, record, "failed", more)?;
+        return Err(plain(nobody.text).hint(people::ANYWAY));
+    }
     let chains = job.sampling.chains();
     let fill = Fill {
         job,
@@ -383,19 +399,6 @@ impl Fill<'_> {
         let quantities = quantities(draws);
         let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
         let modes = modes(&quantities, Some(&self.evidence));
-        warnings.extend(pcadlang_report::warnings(&quantities, &modes, &kernels, chains.len()));
-        if ready.chooses {
-            let person = job.inputs.who.person.unwrap_or(1);
-            let of = |(name, image): &(String, _)| people::warnings(name, image, person);
-            warnings.extend(image.iter().flat_map(of));
-        }
-        let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
-        let last = chains.first().map(|c| &c.last);
-        warnings.extend(last.and_then(|state| structure_warning(state, &sites)));
-        warnings.extend(last.and_then(|state| stuck_warning(state, &sites)));
-        let inputs = image.as_ref().map(|(name, _)| name.as_str()).zip(ready.image());
-        let located = last.map_or_else(Vec::new, |state| state.located());
-        warnings.extend(seen::warnings(inputs, job.keypoints.as_deref(), &located));
         let places = best_of_each(&modes, &watched.best);
         let best = watched.best.state();
         let drawn = show_best(dir, seed, &ready.model, best.as_deref(), &chains, ready.image())?;
@@ -405,6 +408,19 @@ impl Fill<'_> {
         let places = ready.image().and_then(ImageValue::known_places);
         let judged = drawn.mask.as_ref().zip(places);
         let judged = judged.and_then(|(mask, all)| Judgement::of(mask, &all, drawn.agreement));
+        let judged = judged.or_else(|| people::judged(job, ready, drawn.mask.as_ref()?));
+        // Where nothing was found, there is nothing to converge to.
+        if judged.as_ref().is_none_or(|j| j.verdict != Verdict::NotFound) {
+            warnings.extend(pcadlang_report::warnings(&quantities, &modes, &kernels, chains.len()));
+        }
+        warnings.extend(people::several(job, ready));
+        let named = image.as_ref().map(|(name, _)| name.as_str()).zip(ready.image());
+        let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
+        let last = chains.first().map(|c| &c.last);
+        warnings.extend(last.and_then(|state| structure_warning(state, &sites)));
+        warnings.extend(last.and_then(|state| stuck_warning(state, &sites)));
+        let located = last.map_or_else(Vec::new, |state| state.located());
+        warnings.extend(seen::warnings(named, job.keypoints.as_deref(), &located));
         if judged.is_none() {
             warnings.extend(disagreement(&drawn));
         }
@@ -413,8 +429,11 @@ impl Fill<'_> {
         if let Some(found) =
             drawn.view.as_ref().and_then(|v| self.joints.report(v, &modes, seconds))
         {
-            let text = serde_json::to_vec_pretty(&found).unwrap_or_default();
-            write_in(dir, "keypoints.json", &text)?;
+            let mut said = found.clone();
+            if let Some(judged) = &judged {
+                said["found"] = judged.json();
+            }
+            write_json(dir, KEYPOINTS, &said)?;
             let picture = job.observe.first().map_or("", |o| stem(inputs::file_of(o)));
             if let Some(coco) = coco(&found, picture) {
                 write_in(dir, "keypoints.coco.json", coco.to_string().as_bytes())?;

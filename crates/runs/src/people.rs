@@ -1,9 +1,12 @@
-//! Selects a person of a photograph for a run, and warns about the people detected there.
+//! The person of a photograph whom a run fits: who is meant, and whether anyone was found.
 
+use crate::args::Job;
+use crate::inputs::Ready;
+use crate::verdict::Judgement;
 use clap::Args;
 use pcadlang_detectors::people::Person;
-use pcadlang_engine::lang::value::Value;
 use pcadlang_library::scene::ImageValue;
+use pcadlang_scene::vision::Mask;
 use pcadlang_scene::vision::keypoints::COCO;
 use std::path::PathBuf;
 
@@ -18,62 +21,60 @@ pub struct PersonArgs {
     /// pose_detection.tflite, pose_landmark_heavy.tflite, …_full or …_lite
     #[arg(long, value_name = "DIR")]
     pub models: Option<PathBuf>,
+    /// Fit a body even if no person is seen in the photograph
+    #[arg(long)]
+    pub anyway: bool,
 }
 
 /// The joints of a body; landmarks of faces and hands are left out, since they would
 /// outnumber them.
-const BODY: &[&str] = COCO.split_at(5).1;
+pub const BODY: &[&str] = COCO.split_at(5).1;
 
-/// The networks' confidence is below this for most false detections, and for few people
-/// (docs/measurements/detectors.md).
-const DOUBTFUL: f64 = 0.5;
+/// What to do where nobody was found.
+pub const ANYWAY: &str = "say where someone is, --box X,Y,W,H or --at X,Y; --anyway fits a body to \
+                          contours alone, which seldom finds anyone";
 
-/// Warns if no person was found, if another person may be meant, or if little of the body
-/// is in the picture. `person` counts from 1.
-pub fn warnings(name: &str, image: &Value, person: u32) -> Vec<String> {
-    let image = image.downcast::<ImageValue>();
-    let Some((image, people)) = image.and_then(|i| Some((i, i.people()?))) else {
-        return Vec::new();
-    };
-    if people.is_empty() {
-        return vec![format!(
-            "no person was found in `{name}`: without detected joints the body is seldom found \
-             (--keypoints FILE gives the joints found by another detector)"
-        )];
+/// Returns the name of the photograph, the image, the people whom the program found there, the
+/// most prominent first, and the number of the one whom it fits, from 1; `None` if the program
+/// looks for nobody.
+fn seen<'a>(job: &Job, ready: &'a Ready) -> Option<(&'a str, &'a ImageValue, Vec<Person>, usize)> {
+    let (name, _) = ready.named_image.as_ref().filter(|_| ready.chooses)?;
+    let image = ready.image()?;
+    Some((name, image, image.people()?, job.inputs.who.person.unwrap_or(1) as usize))
+}
+
+/// Says that nobody was found, if the program looked for people and the user asks for no body
+/// anyway.
+pub fn nobody(job: &Job, ready: &Ready) -> Option<Judgement> {
+    let (name, _, people, person) = seen(job, ready).filter(|_| !job.inputs.who.anyway)?;
+    match people.len() {
+        n if n >= person => None,
+        0 => Some(Judgement::nobody(&format!("no person is seen in `{name}`"))),
+        n => Some(Judgement::nobody(&format!(
+            "there is no person {person} in `{name}`, where {n} are seen"
+        ))),
     }
-    let Some(chosen) = people.get((person as usize).saturating_sub(1)) else {
-        return vec![format!(
-            "only {} people were found in `{name}`, so there is no person {person}",
-            people.len()
-        )];
-    };
-    let mut all = Vec::new();
-    if chosen.sure < DOUBTFUL {
-        all.push(format!(
-            "`{name}` may not show a person: the networks' confidence is {:.0}% (see the overlay, \
-             or `pcadlang detect`)",
-            100.0 * chosen.sure
-        ));
-    }
-    if people.len() > 1 && image.hint().is_empty() {
-        all.push(format!(
+}
+
+/// Judges the pixels of a body, if the program fits a person of a photograph.
+pub fn judged(job: &Job, ready: &Ready, body: &Mask) -> Option<Judgement> {
+    let (_, image, people, person) = seen(job, ready)?;
+    Some(Judgement::of_person(body, people.get(person - 1)?, image.size()))
+}
+
+/// Warns if another person may be meant.
+pub fn several(job: &Job, ready: &Ready) -> Option<String> {
+    let (name, image, people, person) = seen(job, ready)?;
+    (people.len() > 1 && image.hint().is_empty()).then(|| {
+        format!(
             "several people were found in `{name}`; person {person} is used. Choose another with \
              --person N, --at X,Y or --box X,Y,W,H (`pcadlang detect` lists them)"
-        ));
-    }
-    let inside = inside(chosen, image.size());
-    if 2 * inside < BODY.len() {
-        all.push(format!(
-            "most of the body is outside the picture: {inside} of {} shoulders, elbows, wrists, \
-             hips, knees and ankles are inside; the others are determined by the prior alone",
-            BODY.len()
-        ));
-    }
-    all
+        )
+    })
 }
 
 /// Counts the body's joints inside a picture of this size.
-fn inside(p: &Person, (width, height): (u32, u32)) -> usize {
+pub fn inside(p: &Person, (width, height): (u32, u32)) -> usize {
     let within = |at: [f64; 2]| {
         (0.0..f64::from(width)).contains(&at[0]) && (0.0..f64::from(height)).contains(&at[1])
     };

@@ -1,10 +1,13 @@
-//! Whether the object of a photograph was found: how well the best scene fits the outlines
-//! that the picture itself suggests, in two dimensions. Chains agree where the fit is wrong,
-//! too; the outlines err in other ways than they do (docs/measurements/objects.md).
+//! Whether what a photograph shows was found: how well the best scene fits the outlines
+//! that the picture itself suggests, in two dimensions, or the person that networks see there.
+//! Chains agree where the fit is wrong, too; the outlines err in other ways than they do
+//! (docs/measurements/objects.md, docs/measurements/people.md).
 
+use crate::people::{BODY, inside};
+use pcadlang_detectors::people::Person;
 use pcadlang_library::scene::places::Place;
 use pcadlang_scene::vision::Mask;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use std::fmt;
 
 /// Returns the sentence of the verdict in a `run.json`, if it has one.
@@ -21,7 +24,14 @@ const REGION: [f64; 3] = [0.93, 1.0, 0.85];
 /// less than the last one.
 const NOT_FOUND: [f64; 3] = [0.7, 0.9, 0.2];
 
-/// Whether an object was found.
+/// A person was found if the networks' confidence, and the overlap of the body with their mask of
+/// the person, are at least these, half of the body's joints are in the picture, and most views
+/// agree.
+const PERSON: [f64; 2] = [0.5, 0.55];
+/// A person was not found if the overlap is below this.
+const NO_PERSON: f64 = 0.25;
+
+/// Whether something was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// It was.
@@ -37,19 +47,16 @@ pub enum Verdict {
 pub struct Judgement {
     /// The verdict.
     pub verdict: Verdict,
-    /// What points to the place where the object was fitted ([`Place::source`]).
-    pub source: String,
-    /// The overlap (intersection over union) of the object with the nearest outline there.
-    pub fit: f64,
-    /// The overlap of the first two outlines with each other; 1 for a single one.
-    pub outlines: f64,
-    /// The fraction of covered pixels on which the chains' last states agree.
-    pub chains: Option<f64>,
+    /// It in a sentence.
+    pub text: String,
+    /// What it is based on, by name.
+    reasons: Map<String, Value>,
 }
 
 impl Judgement {
     /// Judges the pixels of the best scene by the places where the object may be; `None` if
-    /// nothing suggests an outline.
+    /// nothing suggests an outline. `chains` is the fraction of covered pixels on which the
+    /// chains' last states agree.
     pub fn of(object: &Mask, places: &[Place], chains: Option<f64>) -> Option<Judgement> {
         let fits = places.iter().flat_map(|p| p.masks.iter().map(move |m| (p, m.overlap(object))));
         let (place, fit) = fits.max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -68,16 +75,96 @@ impl Judgement {
         } else {
             Verdict::Perhaps
         };
-        Some(Judgement { verdict, source: place.source.clone(), fit, outlines, chains })
+        let there = match &*place.source {
+            "drawn" => "the outline that was drawn".into(),
+            "axis" | "box" => format!("the outlines that fit the {}", place.source),
+            "region" => "a region of the picture, in which no detector sees anything".into(),
+            class => format!("the outlines of a {class} that a detector sees"),
+        };
+        let mut text = format!("the object covers {} of {there}", percent(fit));
+        if outlines < FOUND[1] {
+            text += &format!(", which overlap by only {}", percent(outlines));
+        }
+        if let Some(chains) = chains {
+            text += &format!(", and chains agree on {}", percent(chains));
+        }
+        if verdict != Verdict::Found {
+            text += " (say where it is: --box X,Y,W,H, --outline X,Y X,Y X,Y …)";
+        }
+        let reasons = [
+            ("source", json!(place.source)),
+            ("fit", json!(fit)),
+            ("outlines", json!(outlines)),
+            ("chains", json!(chains)),
+        ];
+        Some(Judgement::new(verdict, &text, reasons))
+    }
+
+    /// Judges the pixels of a body by the person whose it is in a photograph of some size,
+    /// pixels.
+    pub fn of_person(body: &Mask, person: &Person, size: (u32, u32)) -> Judgement {
+        let (width, height) = (body.width(), body.height());
+        let mask = person.mask(width, height, size.0).into_iter().map(|m| m > 0.5).collect();
+        let fit = Mask::new(width, height, mask).map_or(0.0, |m| m.overlap(body));
+        let inside = inside(person, size);
+        let [sure, covered] = PERSON;
+        let verdict = if fit < NO_PERSON {
+            Verdict::NotFound
+        } else if person.sure >= sure
+            && fit >= covered
+            && 2 * inside >= BODY.len()
+            && 2 * person.agreeing > person.views
+        {
+            Verdict::Found
+        } else {
+            Verdict::Perhaps
+        };
+        let mut text = format!(
+            "the networks' confidence is {}, and the body covers {} of the person they see",
+            percent(person.sure),
+            percent(fit)
+        );
+        if 2 * inside < BODY.len() {
+            text += &format!("; only {inside} of {} joints are in the picture", BODY.len());
+        }
+        if 2 * person.agreeing <= person.views {
+            text += &format!("; {} of {} views agree", person.agreeing, person.views);
+        }
+        if verdict != Verdict::Found {
+            text += " (say where the person is: --box X,Y,W,H or --at X,Y)";
+        }
+        let reasons = [
+            ("source", json!("person")),
+            ("sure", json!(person.sure)),
+            ("fit", json!(fit)),
+            ("inside", json!(inside)),
+            ("views", json!(person.views)),
+            ("agreeing", json!(person.agreeing)),
+        ];
+        Judgement::new(verdict, &text, reasons)
+    }
+
+    /// Says that no person was found, so that nothing was fitted.
+    pub fn nobody(why: &str) -> Judgement {
+        Judgement::new(Verdict::NotFound, why, [("source", json!("person"))])
+    }
+
+    fn new<const N: usize>(verdict: Verdict, why: &str, reasons: [(&str, Value); N]) -> Judgement {
+        let reasons = reasons.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
+        Judgement { verdict, text: format!("{}: {why}", verdict.name()), reasons }
     }
 
     /// Returns it for `run.json`, with the sentence that says it as `text`.
     pub fn json(&self) -> Value {
-        json!({
-            "verdict": self.verdict.name(), "source": self.source, "fit": self.fit,
-            "outlines": self.outlines, "chains": self.chains, "text": self.to_string(),
-        })
+        let mut all = self.reasons.clone();
+        all.insert("verdict".into(), json!(self.verdict.name()));
+        all.insert("text".into(), json!(self.text));
+        Value::Object(all)
     }
+}
+
+fn percent(fraction: f64) -> String {
+    format!("{:.0}%", 100.0 * fraction)
 }
 
 impl Verdict {
@@ -92,24 +179,7 @@ impl Verdict {
 
 impl fmt::Display for Judgement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = self.verdict.name();
-        let place = match &*self.source {
-            "drawn" => "the outline that was drawn".into(),
-            "axis" | "box" => format!("the outlines that fit the {}", self.source),
-            "region" => "a region of the picture, in which no detector sees anything".into(),
-            class => format!("the outlines of a {class} that a detector sees"),
-        };
-        write!(f, "{name}: the object covers {:.0}% of {place}", 100.0 * self.fit)?;
-        if self.outlines < FOUND[1] {
-            write!(f, ", which overlap by only {:.0}%", 100.0 * self.outlines)?;
-        }
-        if let Some(chains) = self.chains {
-            write!(f, ", and chains agree on {:.0}%", 100.0 * chains)?;
-        }
-        if self.verdict != Verdict::Found {
-            write!(f, " (say where it is: --box X,Y,W,H, --outline X,Y X,Y X,Y …)")?;
-        }
-        Ok(())
+        f.write_str(&self.text)
     }
 }
 

@@ -200,7 +200,9 @@ impl Run {
             (inner.ready.clone(), inner.watched.clone())
         };
         let both = ready.zip(watched);
-        let judged = both.and_then(|(ready, watched)| judged_so_far(&ready, &watched));
+        let judged = both.zip(self.job.as_ref());
+        let judged =
+            judged.and_then(|((ready, watched), job)| judged_so_far(job, &ready, &watched));
         self.lock().paused = judged.map(|judged| judged.to_string());
         Ok(())
     }

@@ -6,7 +6,7 @@
 //! with the view that has most agreement.
 
 use super::landmarks::{NAMED, SeenLandmark, View};
-use super::person::{Hypothesis, Landmark};
+use super::person::{Hypothesis, Landmark, Person};
 use super::window::Window;
 
 /// Shoulders, elbows, wrists, hips, knees, ankles.
@@ -20,23 +20,45 @@ const AGREEING: f64 = 0.5;
 #[derive(Clone, Debug)]
 pub(super) struct Run {
     pub score: f64,
+    /// The box in which this person was looked for, if it was in one.
+    pub in_box: Option<PersonBox>,
     pub found: Window,
     pub view: View,
 }
 
-/// Groups runs by person: windows at about the same position and of about the same size.
-/// People are in the order of their first run.
+/// A box where a person is said to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PersonBox {
+    /// Left, top, right and bottom, in pixels.
+    pub bounds: [f64; 4],
+    /// How likely it is one, 0 to 1.
+    pub score: f64,
+}
+
+impl Run {
+    /// Returns the confidence that this is a person: the presence of landmarks, at most what a
+    /// detector says. Where only the first network sees somebody, it is often wrong, and is
+    /// half believed (docs/measurements/detectors.md).
+    pub fn sure(&self) -> f64 {
+        self.view.presence.min(self.in_box.map_or(0.5 * self.score, |b| b.score))
+    }
+}
+
+/// Groups runs by person: those in the same box, and windows at about the same position and of
+/// about the same size. People are in the order of their first run.
 pub(super) fn by_person(runs: Vec<Run>) -> Vec<Vec<Run>> {
     let mut people: Vec<Vec<Run>> = Vec::new();
     for run in runs {
-        let same = people.iter_mut().find(|p| {
+        let boxed = |p: &Vec<Run>| run.in_box.is_some() && p.iter().any(|r| r.in_box == run.in_box);
+        let near = |p: &Vec<Run>| {
             let (centre, side) = middle(p);
             let apart = distance(run.found.centre, centre);
             apart < 0.25 * side.min(run.found.side)
                 && run.found.side < 2.0 * side
                 && side < 2.0 * run.found.side
-        });
-        match same {
+        };
+        let at = people.iter().position(boxed).or_else(|| people.iter().position(near));
+        match at.map(|i| &mut people[i]) {
             Some(person) => person.push(run),
             None => people.push(vec![run]),
         }
@@ -52,12 +74,18 @@ fn middle(runs: &[Run]) -> ([f64; 2], f64) {
 }
 
 /// Returns the prominence of a person in a picture of this size: it increases with the
-/// number and score of detections, with the person's size, and towards the middle.
-pub(super) fn prominence(runs: &[Run], width: u32, height: u32) -> f64 {
+/// number and score of detections, and with [`prominence`].
+pub(super) fn seen(runs: &[Run], size: (u32, u32)) -> f64 {
     let (centre, side) = middle(runs);
-    let off = libm::hypot(centre[0] / f64::from(width) - 0.5, centre[1] / f64::from(height) - 0.5);
     let seen: f64 = runs.iter().map(|r| r.score).sum();
-    seen * side / f64::from(width.max(height)) * libm::exp(-2.0 * off)
+    seen * prominence(centre, side, size)
+}
+
+/// The prominence of something of this middle and longer side, in pixels, in a picture of this
+/// size: it increases with its size, and towards the middle.
+pub(super) fn prominence(middle: [f64; 2], side: f64, (width, height): (u32, u32)) -> f64 {
+    let off = libm::hypot(middle[0] / f64::from(width) - 0.5, middle[1] / f64::from(height) - 0.5);
+    side / f64::from(width.max(height)) * libm::exp(-2.0 * off)
 }
 
 /// The detection on which the views of a person agree.
@@ -113,11 +141,21 @@ fn most_agreed(runs: &[Run], among: &[usize], torso: f64) -> Option<usize> {
 
 /// Returns the agreement of two views on a pose, 0 to 1.
 fn agreement(a: &View, b: &View, torso: f64) -> f64 {
-    let near = |i: usize| {
-        let d = distance(a.landmarks[i].at, b.landmarks[i].at) / torso / NEAR;
+    likeness(|i| distance(a.landmarks[i].at, b.landmarks[i].at) / torso)
+}
+
+/// Returns whether two people are one who was found twice.
+pub(super) fn same(a: &Person, b: &Person) -> bool {
+    likeness(|i| distance(a.landmarks[i].at, b.landmarks[i].at) / a.torso) > AGREEING
+}
+
+/// Returns how alike two poses are, 0 to 1, whose landmarks have some distances in torsos.
+fn likeness(apart: impl Fn(usize) -> f64) -> f64 {
+    let near = |i: &usize| {
+        let d = apart(*i) / NEAR;
         libm::exp(-0.5 * d * d)
     };
-    LIMBS.iter().map(|i| near(*i)).sum::<f64>() / LIMBS.len() as f64
+    LIMBS.iter().map(near).sum::<f64>() / LIMBS.len() as f64
 }
 
 /// Returns the mean distance from a shoulder to the opposite hip.

@@ -44,6 +44,17 @@ pub(super) struct View {
     pub mask: Vec<f32>,
 }
 
+impl View {
+    /// Returns left, top, right and bottom of the landmarks, within a picture of this size.
+    pub fn bounds(&self, size: [f64; 2]) -> [f64; 4] {
+        let along =
+            |axis: usize| self.landmarks.iter().map(move |l| l.at[axis].clamp(0.0, size[axis]));
+        let least = |axis| along(axis).fold(f64::INFINITY, f64::min);
+        let most = |axis| along(axis).fold(f64::NEG_INFINITY, f64::max);
+        [least(0), least(1), most(0), most(1)]
+    }
+}
+
 /// Returns an error unless the network has the inputs and outputs of a landmark network.
 pub(super) fn check(network: &Network) -> Result<(), NetworkError> {
     let outputs: Vec<&[usize]> = network.output_shapes().collect();

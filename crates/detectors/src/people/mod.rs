@@ -1,12 +1,14 @@
 //! Detects the people in a photograph, with 33 landmarks and a mask for each, by two
 //! small networks of MediaPipe.
 //!
-//! The picture is examined in several views, padded and mirrored. What most of them agree
-//! on is the person; poses that only other views agree on are alternative hypotheses
-//! ([`Person::others`]). The result is a function of the picture alone, with the same
+//! The picture is examined in several views, padded and mirrored, and so is each box where a
+//! person is said to be: these networks alone miss people who are small in the picture. What
+//! most views of a person agree on is the pose; poses that only other views agree on are
+//! alternative hypotheses ([`Person::others`]). The result is a function of the picture alone, with the same
 //! bits on any machine and for any number of threads. The networks themselves
 //! (`pcadlang-models`) and the use of the landmarks are elsewhere.
 
+mod area;
 mod consensus;
 mod detection;
 pub mod json;
@@ -20,17 +22,32 @@ mod window;
 pub use person::{Hypothesis, Landmark, Person};
 
 use crate::nn::{Network, NetworkError};
-use consensus::{Run, by_person, consensus, prominence};
+use crate::objects::FoundObject;
+use area::Area;
+use consensus::{Run, by_person, consensus, prominence, same, seen};
 use landmarks::View;
 use pcadlang_numerics::platform::threads::side_by_side;
 use pcadlang_scene::vision::Photo;
 use std::thread::available_parallelism;
 use window::Window;
 
+/// How much views are padded, as a fraction of the longer side.
+const PADDINGS: [f64; 4] = [0.0, 0.3, 0.15, 0.5];
 /// The maximum longer side that is processed; larger pictures are shrunk first.
 const LONGEST: u32 = 1280;
+/// Objects with a higher score than this are looked at as people.
+const SAID: f64 = 0.25;
 /// If a run has a presence above this, runs with a lower one are ignored.
 const PRESENT: f64 = 0.5;
+
+/// Where to look for people.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Search<'a> {
+    /// In the whole photograph, and in the boxes of a detector of people.
+    Everywhere(&'a [FoundObject]),
+    /// In one box, left, top, right and bottom in pixels, for the person who fills it.
+    Within([f64; 4]),
+}
 
 /// Options of the search for people.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,15 +55,17 @@ pub struct FindOptions {
     /// The number of views, half of them mirrored: 2, 4 or 8, with paddings of 0, 30 %,
     /// 15 % and 50 %.
     pub views: u32,
-    /// The maximum number of people per view.
+    /// The maximum number of people per view, and of boxes.
     pub most: usize,
     /// Minimum score of detections, 0 to 1.
     pub least: f64,
+    /// Minimum confidence that something is a person, 0 to 1 ([`Person::sure`]).
+    pub sure: f64,
 }
 
 impl Default for FindOptions {
     fn default() -> Self {
-        FindOptions { views: 2, most: 2, least: 0.05 }
+        FindOptions { views: 2, most: 2, least: 0.05, sure: 0.3 }
     }
 }
 
@@ -81,6 +100,7 @@ impl PeopleFinder {
     pub fn find(
         &self,
         photo: &Photo,
+        search: Search,
         options: &FindOptions,
         threads: usize,
     ) -> Result<Vec<Person>, NetworkError> {
@@ -88,50 +108,58 @@ impl PeopleFinder {
         let small = (longer > LONGEST).then(|| photo.shrunk(LONGEST));
         let looked_at = small.as_ref().unwrap_or(photo);
         let scale = f64::from(longer) / f64::from(longer.min(LONGEST));
-        let (width, height) = (looked_at.width(), looked_at.height());
-        let paddings =
-            [0.0, 0.3, 0.15, 0.5].into_iter().take(options.views.div_ceil(2).clamp(1, 4) as usize);
-        let whole = |padding| Window::whole(width, height, padding);
-        let views: Vec<Window> =
-            paddings.flat_map(|p| [whole(p), Window { mirrored: true, ..whole(p) }]).collect();
-        let mut seen: Vec<_> = views.into_iter().map(|view| (view, Ok(Vec::new()))).collect();
+        let size = (looked_at.width(), looked_at.height());
+        let paddings = PADDINGS.into_iter().take(options.views.div_ceil(2).clamp(1, 4) as usize);
+        let areas: Vec<Area> = match search {
+            Search::Within(bounds) => {
+                paddings.map(|p| Area::around(bounds.map(|x| x / scale), 1.0, size, p)).collect()
+            }
+            Search::Everywhere(objects) => {
+                let whole = paddings.map(|p| Area::whole(size, p));
+                let around =
+                    |o: &FoundObject| Area::around(o.bounds.map(|x| x / scale), o.score, size, 0.0);
+                let people = said_to_be_people(objects, (photo.width(), photo.height()));
+                whole.chain(people.into_iter().take(options.most).map(around)).collect()
+            }
+        };
+        let views = areas.iter().flat_map(|area| [false, true].map(|mirrored| (area, mirrored)));
+        let mut looked: Vec<_> = views.map(|view| (view, Ok(Vec::new()))).collect();
         let threads =
             if threads == 0 { available_parallelism().map_or(1, usize::from) } else { threads };
-        let share = seen.len().div_ceil(threads).max(1);
-        side_by_side(seen.chunks_mut(share), |_, part| {
-            part.iter_mut().for_each(|(view, runs)| *runs = self.runs(looked_at, view, options));
+        let share = looked.len().div_ceil(threads).max(1);
+        side_by_side(looked.chunks_mut(share), |_, part| {
+            for ((area, mirrored), runs) in part {
+                *runs = area.runs(self, looked_at, *mirrored, options);
+            }
         });
         let mut runs: Vec<Run> =
-            seen.into_iter().map(|(_, runs)| runs).collect::<Result<Vec<_>, _>>()?.concat();
+            looked.into_iter().map(|(_, runs)| runs).collect::<Result<Vec<_>, _>>()?.concat();
         if runs.iter().any(|r| r.view.presence > PRESENT) {
             runs.retain(|r| r.view.presence > PRESENT);
         }
         let mut people: Vec<(f64, Vec<Run>)> =
-            by_person(runs).into_iter().map(|p| (prominence(&p, width, height), p)).collect();
+            by_person(runs).into_iter().map(|p| (seen(&p, size), p)).collect();
         people.sort_by(|a, b| b.0.total_cmp(&a.0));
-        Ok(people.into_iter().filter_map(|(score, runs)| person(score, &runs, scale)).collect())
-    }
-
-    /// Returns a run for each person detected in a view of the whole picture.
-    fn runs(
-        &self,
-        photo: &Photo,
-        view: &Window,
-        options: &FindOptions,
-    ) -> Result<Vec<Run>, NetworkError> {
-        let mut runs = Vec::new();
-        let found = detection::detect(&self.detection, photo, view, options.least)?;
-        for d in found.into_iter().take(options.most) {
-            let Some(first) = landmarks::run_landmarks(&self.landmarks, photo, &d.window)? else {
-                continue;
-            };
-            // A second time, in the window that the first view suggests.
-            if let Some(view) = landmarks::run_landmarks(&self.landmarks, photo, &first.next)? {
-                runs.push(Run { score: d.score, found: d.window, view });
-            }
+        let mut all: Vec<Person> = Vec::new();
+        for (score, runs) in people {
+            let person = person(score, &runs, scale).filter(|p| p.sure >= options.sure);
+            all.extend(person.filter(|p| !all.iter().any(|other| same(other, p))));
         }
-        Ok(runs)
+        Ok(all)
     }
+}
+
+/// Returns the people among objects in a photograph of this size, the most prominent first.
+fn said_to_be_people(objects: &[FoundObject], size: (u32, u32)) -> Vec<&FoundObject> {
+    let mut all: Vec<&FoundObject> =
+        objects.iter().filter(|o| o.name() == "person" && o.score > SAID).collect();
+    let prominence = |o: &FoundObject| {
+        let [left, top, right, bottom] = o.bounds;
+        let middle = [0.5 * (left + right), 0.5 * (top + bottom)];
+        o.score * prominence(middle, (right - left).max(bottom - top), size)
+    };
+    all.sort_by(|a, b| prominence(b).total_cmp(&prominence(a)));
+    all
 }
 
 /// Combines the runs of a person, scaling pixels by `scale`.
@@ -152,7 +180,7 @@ fn person(score: f64, runs: &[Run], scale: f64) -> Option<Person> {
     };
     Some(Person {
         score,
-        sure: runs.iter().map(|r| r.score.min(r.view.presence)).fold(0.0, f64::max),
+        sure: runs.iter().map(Run::sure).fold(0.0, f64::max),
         bounds: [least(0), least(1), most(0), most(1)],
         torso: c.torso * scale,
         views: runs.len(),

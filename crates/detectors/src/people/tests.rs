@@ -1,6 +1,7 @@
 //! Tests of windows, grouping of detections and consensus of views; and, with the
 //! included networks, of a photograph.
 
+use super::Search;
 use super::consensus::{Run, by_person, consensus};
 use super::landmarks::{NAMED, SIDE, SeenLandmark, View};
 use super::window::{Beyond, Window};
@@ -126,7 +127,7 @@ fn run(hips: [f64; 2], torso: f64, moved: f64) -> Run {
     });
     let window = Window { centre: hips, side: 4.0 * torso, turn: 0.0, mirrored: false };
     let view = View { window, presence: 0.9, landmarks, next: window, mask: Vec::new() };
-    Run { score: 0.8, found: window, view }
+    Run { score: 0.8, in_box: None, found: window, view }
 }
 
 #[test]
@@ -202,8 +203,11 @@ mod shipped {
     fn a_skier_is_found_with_the_same_bits_on_any_number_of_threads() {
         let (finder, photo) = (finder(), skier());
         let options = FindOptions::default();
-        let people = finder.find(&photo, &options, 1).unwrap();
-        assert_eq!(bits(&people), bits(&finder.find(&photo, &options, 2).unwrap()));
+        let people = finder.find(&photo, Search::Everywhere(&[]), &options, 1).unwrap();
+        assert_eq!(
+            bits(&people),
+            bits(&finder.find(&photo, Search::Everywhere(&[]), &options, 2).unwrap())
+        );
         let [skier] = &people[..] else { panic!("{} people", people.len()) };
         let at = |name: &str| skier.landmark(name).unwrap().at;
         // COCO's annotation of this picture (CC BY 4.0, COCO Consortium).
@@ -237,7 +241,12 @@ mod shipped {
             Photo::from_rgb(image::RgbImage::from_pixel(16_000, 3, image::Rgb([90, 20, 200])))
                 .unwrap();
         for photo in [grey, dot, wide] {
-            assert!(finder().find(&photo, &FindOptions::default(), 1).unwrap().is_empty());
+            assert!(
+                finder()
+                    .find(&photo, Search::Everywhere(&[]), &FindOptions::default(), 1)
+                    .unwrap()
+                    .is_empty()
+            );
         }
     }
 

@@ -3,7 +3,7 @@
 //! Data that comparators derive from an observation alone are computed on first use and
 //! cached with it.
 
-use super::{IMAGE, native, people};
+use super::{IMAGE, native};
 use pcadlang_detectors::people::Person;
 use pcadlang_engine::lang::builtins::{Domain, Row, Type, arg, int, num, opt};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
@@ -73,8 +73,16 @@ impl Prepared {
     }
 }
 
-/// The options of a search for people: the number of views, and the maximum number of people.
-pub(super) type PeopleKey = (u32, u32);
+/// A search for people.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PeopleKey {
+    /// The number of views.
+    pub views: u32,
+    /// The maximum number of people per view.
+    pub most: u32,
+    /// The box that is searched, left, top, right and bottom; without it, all of the photograph.
+    pub within: Option<[f64; 4]>,
+}
 
 /// A photograph, a ready-made contour map, or both, and what a user pointed out in it.
 /// Images of one picture with different hints share what was found in it.
@@ -145,13 +153,6 @@ impl ImageValue {
     /// prominent first; `None` if no program did.
     pub fn people(&self) -> Option<Vec<Person>> {
         self.people_by(&self.hint)
-    }
-
-    /// The same in the order of another hint.
-    pub(super) fn people_by(&self, hint: &Hint) -> Option<Vec<Person>> {
-        let all = self.prepared().first::<PeopleKey, Vec<(Person, Value)>>()?;
-        let order = people::order(&all, hint, self.size());
-        Some(order.into_iter().map(|i| all[i].0.clone()).collect())
     }
 
     /// Returns its contours, detecting them if necessary.

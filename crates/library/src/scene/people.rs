@@ -1,10 +1,12 @@
 //! The people in a photograph, as values: a thin layer over [`pcadlang_detectors::people`].
 
+use super::found_objects::found;
 use super::hint::{self, HINT};
 use super::observed::{KeypointsValue, MaskValue, PeopleKey};
 use super::{IMAGE, ImageValue, native};
-use pcadlang_detectors::boxes::{contains, overlap};
-use pcadlang_detectors::people::{FindOptions, Person, networks};
+use pcadlang_detectors::boxes::contains;
+use pcadlang_detectors::objects::View;
+use pcadlang_detectors::people::{FindOptions, Person, Search, networks};
 use pcadlang_engine::lang::builtins::{Row, Type, arg, int};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
@@ -17,6 +19,9 @@ const MASK: u32 = 256;
 /// The weight of an alternative pose relative to that on which most views agree, if
 /// equally many views support both; proportional to the number of its views.
 const ELSEWHERE: f64 = 0.05;
+/// The sides of the squares around a click on someone whom nothing else sees, as fractions of
+/// the photograph's longer side.
+const AROUND: [f64; 2] = [0.5, 0.25];
 
 pub(super) const TABLE: &[Row] = &[native(
     "people",
@@ -33,60 +38,134 @@ pub(super) const TABLE: &[Row] = &[native(
         HINT,
     ],
     Type::Array,
-    "The people in a photograph: first those at most positions `at` of the hint, then those who \
-     fill its box (or else its mask or outline) best, then the most prominent; last those at its \
-     positions `not`. Each is a record: `keypoints`, 33 joints, with alternative positions where \
-     views disagree; `landmarks`, by name `at`, `spread` over agreeing views and `visibility`; \
-     `metres`, by name [right, down, away] from the mid-hip; `mask`; `box`, [x, y, width, height] \
-     around all joints, and `torso`, in pixels; `score`; `sure`, the confidence from 0 to 1 that \
-     this is a person; `views`, the number of views in which the person was found, and \
-     `agreeing`, how many of them agree. Who is found depends only on the picture, and is \
-     computed once.",
+    "The people in a photograph, the most prominent first, in the whole of it and in the boxes \
+     where `scene.objects` sees people. With a box (or else a mask or an outline) in the hint, only \
+     whoever fills it; with positions `at`, first those at most of them, and last those at its \
+     positions `not`: an error if there is nobody. Each is a record: `keypoints`, 33 joints, with \
+     alternative positions where views disagree; `landmarks`, by name `at`, `spread` over agreeing \
+     views and `visibility`; `metres`, by name [right, down, away] from the mid-hip; `mask`; `box`, \
+     [x, y, width, height] around all joints, and `torso`, in pixels; `score`; `sure`, the \
+     confidence from 0 to 1 that this is a person; `views`, the number of views in which the person \
+     was found, and `agreeing`, how many of them agree. Computed once.",
     |a| {
         let image = a.object::<ImageValue>(0, "an image")?;
-        let Some(photo) = image.as_photo() else { return Ok(Value::List(Arc::from([]))) };
         let (views, most, hint) = (a.int("views")?, a.int("most")?, hint::asked(a, image)?);
-        let key: PeopleKey = (views, most);
-        let found = image.prepared().get(key, |_| {
-            let options = FindOptions { views, most: most as usize, ..FindOptions::default() };
-            let fault = |why: String| Fault::new(FaultKind::Other, format!("scene.people: {why}"));
-            let finder = networks::finder().map_err(|why| fault(why.into()))?;
-            let found = finder.find(photo, &options, 0).map_err(|e| fault(e.to_string()))?;
-            found.into_iter().map(|p| Ok((p.clone(), value(&p, photo).map_err(fault)?))).collect()
-        });
-        let found: Arc<Vec<(Person, Value)>> = found?;
-        let order = order(&found, &hint, (photo.width(), photo.height()));
-        Ok(Value::List(order.into_iter().map(|i| found[i].1.clone()).collect()))
+        let found = image.search_people(views, most, &hint)?;
+        Ok(Value::List(found.into_iter().map(|(_, value)| value).collect()))
     },
 )];
 
-/// Returns the order of people by a hint; without one, as they are.
-pub(super) fn order(
-    found: &[(Person, Value)],
-    hint: &Hint,
-    (width, height): (u32, u32),
-) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..found.len()).collect();
-    let wanted = hint.around(width, height).map(|[x, y, w, h]| [x, y, x + w, y + h]);
-    let filled = |(p, _): &(Person, Value)| wanted.map_or(0.0, |w| overlap(p.bounds, w));
-    let filled: Vec<f64> = found.iter().map(filled).collect();
+/// People and the records of them.
+type Found = Vec<(Person, Value)>;
+
+impl ImageValue {
+    /// Looks for people where a hint says, the most prominent first.
+    ///
+    /// # Errors
+    /// If the hint points to nobody, or a detector fails.
+    pub(super) fn search_people(&self, views: u32, most: u32, hint: &Hint) -> Result<Found, Fault> {
+        let Some(photo) = self.as_photo() else { return Ok(Vec::new()) };
+        let (width, height) = (photo.width(), photo.height());
+        let key = PeopleKey { views, most, within: None };
+        if let Some(bounds) = hint.around(width, height) {
+            let within = Some(sides(bounds));
+            let found = self.people_of(photo, PeopleKey { within, ..key })?;
+            return match found.is_empty() {
+                true => Err(nobody(format!("fills the box {bounds:.0?}"))),
+                false => Ok(found.to_vec()),
+            };
+        }
+        let found = self.people_of(photo, key)?;
+        let Some(at) = hint.at.first() else { return Ok(ordered(&found, hint, self.size())) };
+        let near = |found: &Found| !on(found, *at, self.size()).is_empty();
+        if near(&found) {
+            return Ok(ordered(&found, hint, self.size()));
+        }
+        // Someone whom nothing saw: what is around the click, larger and smaller.
+        for part in AROUND {
+            let reach = 0.5 * part * f64::from(width.max(height));
+            let within = Some([at[0] - reach, at[1] - reach, at[0] + reach, at[1] + reach]);
+            let found = self.people_of(photo, PeopleKey { within, ..key })?;
+            if near(&found) {
+                return Ok(found.to_vec());
+            }
+        }
+        Err(nobody(format!("is seen at {:.0}, {:.0}", at[0], at[1])))
+    }
+
+    fn people_of(&self, photo: &Photo, key: PeopleKey) -> Result<Arc<Found>, Fault> {
+        self.prepared().get(key, |key| {
+            let options =
+                FindOptions { views: key.views, most: key.most as usize, ..FindOptions::default() };
+            let fault = |why: String| Fault::new(FaultKind::Other, format!("scene.people: {why}"));
+            let finder = networks::finder().map_err(|why| fault(why.into()))?;
+            let objects = match key.within {
+                Some(_) => Arc::default(),
+                None => found(self, &[View::WHOLE])?,
+            };
+            let search = key.within.map_or(Search::Everywhere(&objects), Search::Within);
+            let found = finder.find(photo, search, &options, 0);
+            let found = found.map_err(|e| fault(e.to_string()))?;
+            found.into_iter().map(|p| Ok((p.clone(), value(&p, photo).map_err(fault)?))).collect()
+        })
+    }
+
+    /// Returns the people that programs found where a hint says; `None` if none looked there.
+    pub(super) fn people_by(&self, hint: &Hint) -> Option<Vec<Person>> {
+        let around = hint.around(self.size().0, self.size().1).map(sides);
+        let within = self.prepared().known::<PeopleKey, Found>(|key| key.within == around);
+        let all = within?;
+        Some(ordered(&all, hint, self.size()).into_iter().map(|(p, _)| p).collect())
+    }
+
+    /// Returns the person at a hint, if programs looked for people here; quickly, only of those
+    /// who were found.
+    pub(super) fn person_at(&self, hint: &Hint, quick: bool) -> Option<Person> {
+        let seen = self.prepared().first::<PeopleKey, Found>()?;
+        let known = self.people_by(hint);
+        if quick || seen.is_empty() || known.is_some() {
+            return known?.into_iter().next();
+        }
+        let FindOptions { views, most, .. } = FindOptions::default();
+        let found = self.search_people(views, most as u32, hint).ok()?;
+        found.into_iter().next().map(|(person, _)| person)
+    }
+}
+
+fn nobody(why: String) -> Fault {
+    Fault::new(FaultKind::Other, format!("scene.people: no person {why}")).with_hint(
+        "a box is drawn around the whole of a person; without --box and --at, everyone is looked \
+         for (`pcadlang detect` lists them)",
+    )
+}
+
+/// Returns people in the order of the positions of a hint: first those at most of `at`, last
+/// those at `not`.
+fn ordered(found: &Found, hint: &Hint, size: (u32, u32)) -> Found {
     let count = |positions: &[[f64; 2]]| {
         let mut counts = vec![0_u32; found.len()];
-        for p in positions {
-            let at = [p[0] / f64::from(width), p[1] / f64::from(height)];
-            let on: Vec<usize> = (0..found.len()).filter(|i| on_mask(&found[*i].1, at)).collect();
-            let within = || (0..found.len()).filter(|i| contains(found[*i].0.bounds, *p)).collect();
-            let on = if on.is_empty() { within() } else { on };
-            on.into_iter().for_each(|i| counts[i] += 1);
-        }
+        positions.iter().flat_map(|p| on(found, *p, size)).for_each(|i| counts[i] += 1);
         counts
     };
-    let (on, beside) = (count(&hint.at), count(&hint.not));
-    order.sort_by(|i, j| {
-        let positions = beside[*i].cmp(&beside[*j]).then(on[*j].cmp(&on[*i]));
-        positions.then(filled[*j].total_cmp(&filled[*i]))
-    });
-    order
+    let (at, beside) = (count(&hint.at), count(&hint.not));
+    let mut order: Vec<usize> = (0..found.len()).collect();
+    order.sort_by(|i, j| beside[*i].cmp(&beside[*j]).then(at[*j].cmp(&at[*i])));
+    order.into_iter().map(|i| found[i].clone()).collect()
+}
+
+/// Returns who is at a position: on whose mask it is, or else in whose box.
+fn on(found: &Found, p: [f64; 2], (width, height): (u32, u32)) -> Vec<usize> {
+    let at = [p[0] / f64::from(width), p[1] / f64::from(height)];
+    let masked: Vec<usize> = (0..found.len()).filter(|i| on_mask(&found[*i].1, at)).collect();
+    match masked.is_empty() {
+        true => (0..found.len()).filter(|i| contains(found[*i].0.bounds, p)).collect(),
+        false => masked,
+    }
+}
+
+/// Returns left, top, right and bottom of a box of left, top, width and height.
+fn sides([x, y, w, h]: [f64; 4]) -> [f64; 4] {
+    [x, y, x + w, y + h]
 }
 
 /// Returns whether a position, a fraction of the picture's width and height, is on a

@@ -33,9 +33,8 @@ impl ImageValue {
             return Ok(Some(Place::outlined("drawn", 1.0, None, vec![mask])));
         }
         // A program about people takes the one at the hint, wherever objects are.
-        let people = self.people_by(hint).unwrap_or_default();
-        if let Some(person) = people.first() {
-            return Ok((!hint.is_empty()).then(|| of_person(photo, person)));
+        if let Some(person) = self.person_at(hint, quick) {
+            return Ok((!hint.is_empty()).then(|| of_person(photo, &person)));
         }
         if hint.is_empty() {
             return found(self, &VIEWS).map(|_| None);

@@ -1,0 +1,99 @@
+//! Parts of a photograph in which people are looked for: the whole, or a box where a person
+//! is said to be.
+
+use super::consensus::{PersonBox, Run};
+use super::landmarks::{self, View};
+use super::window::Window;
+use super::{FindOptions, PeopleFinder, detection};
+use crate::boxes::overlap;
+use crate::nn::NetworkError;
+use pcadlang_scene::vision::Photo;
+
+/// A box is looked at with this much around it, on each side, as a fraction of its longer side.
+const AROUND: f64 = 0.1;
+/// If nobody is detected in a box, landmarks are looked for in a window of this many times its
+/// longer side.
+const AROUND_ALL: f64 = 1.25;
+/// The minimum overlap (intersection over union) of a box with that of the landmarks of the
+/// person in it.
+const FILLS: f64 = 0.4;
+/// The minimum presence of the person in a box.
+const PRESENT: f64 = 0.5;
+
+/// A part of a photograph.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Area {
+    window: Window,
+    /// The box of one person.
+    person: Option<PersonBox>,
+    size: [f64; 2],
+}
+
+impl Area {
+    /// The whole of a photograph of some size, with padding.
+    pub fn whole((width, height): (u32, u32), padding: f64) -> Area {
+        let size = [width, height].map(f64::from);
+        Area { window: Window::whole(width, height, padding), person: None, size }
+    }
+
+    /// The surroundings of a box in such a photograph, with more padding.
+    pub fn around(bounds: [f64; 4], score: f64, size: (u32, u32), padding: f64) -> Area {
+        let window = square(bounds, 1.0 + 2.0 * (AROUND + padding));
+        Area { window, person: Some(PersonBox { bounds, score }), ..Area::whole(size, 0.0) }
+    }
+
+    /// Returns a run for each person detected there, one at most in a box.
+    ///
+    /// # Errors
+    /// Errors of the networks.
+    pub fn runs(
+        &self,
+        finder: &PeopleFinder,
+        photo: &Photo,
+        mirrored: bool,
+        options: &FindOptions,
+    ) -> Result<Vec<Run>, NetworkError> {
+        let view = Window { mirrored, ..self.window };
+        let found = detection::detect(&finder.detection, photo, &view, options.least)?;
+        let mut runs = Vec::new();
+        for d in found.into_iter().take(options.most) {
+            if let Some(view) = twice(finder, photo, &d.window)? {
+                let score = self.person.map_or(d.score, |b| b.score.max(d.score));
+                runs.push(Run { score, in_box: self.person, found: d.window, view });
+            }
+        }
+        let Some(PersonBox { bounds, score }) = self.person else { return Ok(runs) };
+        if let Some(run) = self.filling(runs, bounds) {
+            return Ok(vec![run]);
+        }
+        let all = Window { mirrored, ..square(bounds, AROUND_ALL) };
+        let seen = twice(finder, photo, &all)?;
+        let run = seen.map(|view| Run { score, in_box: self.person, found: view.window, view });
+        Ok(self.filling(run, bounds).into_iter().collect())
+    }
+
+    /// Returns the run of the person who fills a box.
+    fn filling(&self, runs: impl IntoIterator<Item = Run>, bounds: [f64; 4]) -> Option<Run> {
+        let fit = |r: &Run| overlap(r.view.bounds(self.size), bounds);
+        let fits = |r: &Run| r.view.presence > PRESENT && fit(r) > FILLS;
+        runs.into_iter().filter(fits).max_by(|a, b| fit(a).total_cmp(&fit(b)))
+    }
+}
+
+/// Detects landmarks in a window, then in the window that they suggest.
+fn twice(
+    finder: &PeopleFinder,
+    photo: &Photo,
+    window: &Window,
+) -> Result<Option<View>, NetworkError> {
+    match landmarks::run_landmarks(&finder.landmarks, photo, window)? {
+        Some(first) => landmarks::run_landmarks(&finder.landmarks, photo, &first.next),
+        None => Ok(None),
+    }
+}
+
+/// An upright window about the middle of a box, with a side of so many times its longer side.
+fn square([left, top, right, bottom]: [f64; 4], times: f64) -> Window {
+    let centre = [0.5 * (left + right), 0.5 * (top + bottom)];
+    Window { centre, side: times * (right - left).max(bottom - top), turn: 0.0, mirrored: false }
+}
