@@ -251,15 +251,6 @@ pub fn perform_watched(
 ) -> Result<Outcome, Failure> {
     write_record(dir, record, "running", json!({}))?;
     write_in(dir, PROGRAM, ready.model.text().as_bytes())?;
-    if let Some(nobody) = people::nobody(job, ready) {
-        let found = json!({ "found": nobody.json() });
-        write_json(dir, KEYPOINTS, &found)?;
-        let mut more =
-            json!({ "error": nobody.text, "seconds": ready.begun.elapsed().as_secs_f64() });
-        more["found"] = found["found"].clone();
-        write_record(dir, record, "failed", more)?;
-        return Err(plain(nobody.text).hint(people::ANYWAY));
-    }
     let chains = job.sampling.chains();
     let fill = Fill {
         job,
@@ -314,6 +305,10 @@ struct Fill<'a> {
 impl Fill<'_> {
     /// Runs the chains, and writes what was found.
     fn all(&self, mode: &RunMode, interrupt: &Interrupt) -> Result<Outcome, Failure> {
+        if let Some(nobody) = people::nobody(self.job, self.ready)? {
+            write_json(self.dir, KEYPOINTS, &json!({ "found": nobody.json() }))?;
+            return Err(plain(nobody.text).hint(people::ANYWAY));
+        }
         let started = self.sample(mode, interrupt)?;
         let sampled = self.ready.begun.elapsed();
         let interrupted = self.watched.progress.cancelled.load(Ordering::Relaxed);

@@ -1,6 +1,7 @@
 //! The person of a photograph whom a run fits: who is meant, and whether anyone was found.
 
 use crate::args::Job;
+use crate::failure::Failure;
 use crate::inputs::Ready;
 use crate::verdict::Judgement;
 use clap::Args;
@@ -43,17 +44,23 @@ fn seen<'a>(job: &Job, ready: &'a Ready) -> Option<(&'a str, &'a ImageValue, Vec
     Some((name, image, image.people()?, job.inputs.who.person.unwrap_or(1) as usize))
 }
 
-/// Says that nobody was found, if the program looked for people and the user asks for no body
+/// Says that nobody was found, if the program looks for people and the user asks for no body
 /// anyway.
-pub fn nobody(job: &Job, ready: &Ready) -> Option<Judgement> {
-    let (name, _, people, person) = seen(job, ready).filter(|_| !job.inputs.who.anyway)?;
-    match people.len() {
-        n if n >= person => None,
-        0 => Some(Judgement::nobody(&format!("no person is seen in `{name}`"))),
-        n => Some(Judgement::nobody(&format!(
-            "there is no person {person} in `{name}`, where {n} are seen"
-        ))),
+///
+/// # Errors
+/// If the program fails, for example where nobody fills a box.
+pub fn nobody(job: &Job, ready: &Ready) -> Result<Option<Judgement>, Failure> {
+    if ready.chooses && ready.image().is_some_and(|i| i.people().is_none()) {
+        // A program looks for people when it runs first.
+        ready.model.simulate(job.sampling.seed, 0)?;
     }
+    let Some((name, _, people, person)) = seen(job, ready) else { return Ok(None) };
+    let why = match people.len() {
+        n if n >= person || job.inputs.who.anyway => return Ok(None),
+        0 => format!("no person is seen in `{name}`"),
+        n => format!("there is no person {person} in `{name}`, where {n} are seen"),
+    };
+    Ok(Some(Judgement::nobody(&why)))
 }
 
 /// Judges the pixels of a body, if the program fits a person of a photograph.

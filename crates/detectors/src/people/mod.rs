@@ -65,7 +65,7 @@ pub struct FindOptions {
 
 impl Default for FindOptions {
     fn default() -> Self {
-        FindOptions { views: 2, most: 2, least: 0.05, sure: 0.3 }
+        FindOptions { views: 2, most: 2, least: 0.3, sure: 0.3 }
     }
 }
 
