@@ -14,9 +14,10 @@ const AROUND: f64 = 0.1;
 /// If nobody is detected in a box, landmarks are looked for in a window of this many times its
 /// longer side.
 const AROUND_ALL: f64 = 1.25;
-/// The minimum overlap (intersection over union) of a box with that of the landmarks of the
-/// person in it.
-const FILLS: f64 = 0.4;
+/// The minimum overlap (intersection over union) of a detector's box with that of the landmarks
+/// of the person in it, and of a box that a user drew.
+pub(super) const DETECTED: f64 = 0.4;
+pub(super) const DRAWN: f64 = 0.2;
 /// The minimum presence of the person in a box.
 const PRESENT: f64 = 0.5;
 
@@ -26,6 +27,8 @@ pub(super) struct Area {
     window: Window,
     /// The box of one person.
     person: Option<PersonBox>,
+    /// The minimum overlap of the box with that of the person's landmarks.
+    fills: f64,
     size: [f64; 2],
 }
 
@@ -33,13 +36,13 @@ impl Area {
     /// The whole of a photograph of some size, with padding.
     pub fn whole((width, height): (u32, u32), padding: f64) -> Area {
         let size = [width, height].map(f64::from);
-        Area { window: Window::whole(width, height, padding), person: None, size }
+        Area { window: Window::whole(width, height, padding), person: None, fills: 0.0, size }
     }
 
-    /// The surroundings of a box in such a photograph, with more padding.
-    pub fn around(bounds: [f64; 4], score: f64, size: (u32, u32), padding: f64) -> Area {
-        let window = square(bounds, 1.0 + 2.0 * (AROUND + padding));
-        Area { window, person: Some(PersonBox { bounds, score }), ..Area::whole(size, 0.0) }
+    /// The surroundings of a person's box in such a photograph, with more padding.
+    pub fn around(person: PersonBox, fills: f64, size: (u32, u32), padding: f64) -> Area {
+        let window = square(person.bounds, 1.0 + 2.0 * (AROUND + padding));
+        Area { window, person: Some(person), fills, ..Area::whole(size, 0.0) }
     }
 
     /// Returns a run for each person detected there, one at most in a box.
@@ -75,7 +78,7 @@ impl Area {
     /// Returns the run of the person who fills a box.
     fn filling(&self, runs: impl IntoIterator<Item = Run>, bounds: [f64; 4]) -> Option<Run> {
         let fit = |r: &Run| overlap(r.view.bounds(self.size), bounds);
-        let fits = |r: &Run| r.view.presence > PRESENT && fit(r) > FILLS;
+        let fits = |r: &Run| r.view.presence > PRESENT && fit(r) > self.fills;
         runs.into_iter().filter(fits).max_by(|a, b| fit(a).total_cmp(&fit(b)))
     }
 }
