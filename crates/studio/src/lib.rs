@@ -9,6 +9,7 @@ extern crate pcadlang_runs;
 
 mod app;
 mod args;
+mod examples;
 mod folder;
 mod guard;
 mod guess;
