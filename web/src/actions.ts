@@ -4,6 +4,7 @@
 import { Latest, Refusal, type Connection } from "./connection";
 import type { Place } from "./fragment";
 import type * as P from "./protocol";
+import { isEmpty } from "./pointing";
 import { imageItem, isLive, runName } from "./protocol";
 
 /** The states that the viewer shows. */
@@ -159,18 +160,22 @@ export class Actions {
   }
 
   /** Opens a session of a program file, with the photograph at hand if it takes one. */
-  async openProgram(program: string): Promise<void> {
+  openProgram(program: string): Promise<void> {
+    return this.mine(async () => this.open(program));
+  }
+
+  private async open(program: string): Promise<void> {
     await this.hints.rest;
     const { session: before, photo } = this.store.now;
-    const asked = this.connection.ask<P.Session | P.Wanting>("open", { program, photo });
-    this.own = asked.catch(() => {});
-    let session = await asked;
+    const params = { program, photo };
+    let session = await this.connection.ask<P.Session | P.Wanting>("open", params);
     if (session.session === null) {
       this.store.set({ session: null, wanting: session, ...NO_RUN });
       await this.closeLast(null);
     } else {
       // The same photograph keeps its hint.
-      if (session.photo && session.photo.name === before?.photo?.name) {
+      const same = session.photo !== null && session.photo.name === before?.photo?.name;
+      if (same && !isEmpty(before.hint)) {
         const params = { session: session.session, hint: before.hint };
         session = await this.connection.ask<P.Session>("hint", params);
       }
@@ -191,11 +196,13 @@ export class Actions {
   }
 
   /** Opens a session at the best state of a run. */
-  async openRun(run: string): Promise<void> {
+  openRun(run: string): Promise<void> {
+    return this.mine(async () => this.edit(run));
+  }
+
+  private async edit(run: string): Promise<void> {
     // The run stays in view: its draws are the ghosts behind what is edited.
-    const asked = this.connection.ask<P.Session>("open", { run });
-    this.own = asked.catch(() => {});
-    const session = await asked;
+    const session = await this.connection.ask<P.Session>("open", { run });
     const photo = session.photo?.name ?? this.store.now.photo;
     this.store.set({ session, wanting: null, photo, view: "session" });
     await this.closeLast(session.session);
@@ -290,11 +297,19 @@ export class Actions {
         ? new Refusal(`${wanting.program} needs a photograph`, PHOTO_HINT)
         : new Refusal("There is no program to run", "choose one at the top, or drop its file");
     }
-    const asked = this.connection.ask<P.Run>("run", { session: session.session, settings });
-    this.own = asked.catch(() => {});
-    const run = await asked;
-    this.keep(run);
-    this.choose(run.run, "best");
+    const params = { session: session.session, settings };
+    await this.mine(async () => {
+      const run = await this.connection.ask<P.Run>("run", params);
+      this.keep(run);
+      this.choose(run.run, "best");
+    });
+  }
+
+  /** Opens or starts something: the events of it are no news of other tabs. */
+  private mine(task: () => Promise<void>): Promise<void> {
+    const done = task();
+    this.own = done.catch(() => {});
+    return done;
   }
 
   /** Pauses, goes on with, or stops a run. */

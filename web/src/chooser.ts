@@ -88,10 +88,10 @@ export class Chooser {
   }
 
   /** Buttons for an example and a file. */
-  photoButtons(): HTMLElement[] {
+  photoButtons(kind = "primary"): HTMLElement[] {
     const examples = this.examples().map((picture) => {
       const title = "A photograph that comes with pcadlang";
-      return button(`Example: ${picture}`, () => this.example(picture), { class: "primary", title });
+      return button(`Example: ${picture}`, () => this.example(picture), { class: kind, title });
     });
     return [...examples, button("A file …", () => this.pictureFile())];
   }

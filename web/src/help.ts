@@ -43,7 +43,7 @@ export function helpButton(): HTMLElement {
   const dialog = h(
     "dialog",
     { "aria-label": "Help" },
-    h("h2", {}, "From a program and a photograph to a scene"),
+    h("h2", { tabindex: "-1", autofocus: true }, "From a program and a photograph to a scene"),
     table(STEPS, "b"),
     h("h2", {}, "Keys"),
     table(KEYS, "kbd"),

@@ -115,9 +115,12 @@ tabs.choose(place.tab ?? "trace");
 store.set({ tab: place.tab ?? "trace" });
 arrange();
 acceptDrops(root, (file) => bar.chooser.take(file));
-// A program without a scene gives its room to the tabs.
-store.on(["session", "run"], () => {
-  const { session, run, tab } = store.now;
+// A program without a scene gives its room to the tabs; on the first page there is nothing for them.
+store.on(["session", "wanting", "run", "runs"], () => {
+  const { session, wanting, run, runs, tab } = store.now;
+  const first = session === null && runs.length === 0;
+  root.classList.toggle("first", first);
+  root.classList.toggle("blank", first && wanting === null);
   const of = store.currentRun;
   const flat = session !== null && !session.has_view && (!of || of.session === session.session);
   root.classList.toggle("flat", flat);
@@ -140,4 +143,5 @@ connection.onChange = (connected) => {
       : "Open the address that `pcadlang studio` printed: this one has no token.";
   }
 };
+root.classList.add("first", "blank");
 connection.connect();

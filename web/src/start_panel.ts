@@ -45,7 +45,8 @@ export class StartPanel {
     const programs = folder?.programs ?? [];
     const group = (title: string, all: Program[]) => {
       if (all.length === 0) return [];
-      return [h("h3", {}, title), ...all.map((p) => this.card(p, wanting?.program === p.file))];
+      const cards = all.map((p) => this.card(p, wanting?.program === p.file));
+      return [h("h3", {}, title), h("div", { class: "choices" }, ...cards)];
     };
     const of = (test: (p: Program) => boolean) => programs.filter(test);
     const program = h(
@@ -59,16 +60,22 @@ export class StartPanel {
         button("A program's file …", () => this.chooser.programFile()),
       ),
       ...group("In this folder", of((p) => !p.shipped)),
-      ...group("For a photograph", of((p) => p.shipped && Boolean(p.example))),
+      // Variants have longer names.
+      ...group(
+        "For a photograph",
+        of((p) => p.shipped && Boolean(p.example)).sort((a, b) => a.file.length - b.file.length),
+      ),
       ...group("Others that come with pcadlang", of((p) => p.shipped && !p.example)),
     );
-    return [program, this.photograph(photo, hasAsked)];
+    // Where a photograph is asked for, there may be no more to say of it.
+    const isSaid = hasAsked && photo === null && (folder?.pictures ?? []).length === 0;
+    return isSaid ? [program] : [program, this.photograph(photo, hasAsked)];
   }
 
   private card({ file, about }: Program, chosen: boolean): HTMLElement {
     const open = () => this.chooser.program(file);
     const attributes = { type: "button", class: "choice", onclick: open, "aria-pressed": `${chosen}` };
-    return h("button", attributes, h("b", {}, file), h("span", { class: "muted" }, about ?? ""));
+    return h("button", attributes, h("b", {}, file), h("span", { class: "muted" }, whole(about)));
   }
 
   private photograph(photo: string | null, hasAsked: boolean): HTMLElement {
@@ -86,9 +93,15 @@ export class StartPanel {
       { "aria-label": "Choose a photograph" },
       h("h2", {}, "Choose a photograph"),
       // The same buttons stand above where one is asked for.
-      hasAsked ? null : h("div", { class: "buttons" }, ...this.chooser.photoButtons()),
+      hasAsked ? null : h("div", { class: "buttons" }, ...this.chooser.photoButtons("")),
       names.length > 0 ? list : null,
       image ?? h("p", { class: "muted" }, "Or drop one here. Programs without data need none."),
     );
   }
+}
+
+/** The whole sentences, or clauses, of a line that may go on in the next one. */
+function whole(about: string | null): string {
+  const text = about ?? "";
+  return /[.!?]$/.test(text) ? text : text.replace(/[.;,] [^.;,]*$/, ".");
 }

@@ -50,9 +50,8 @@ export class TopBar {
       { class: "top-bar" },
       h("span", { class: "brand" }, "pcadlang"),
       h("div", { class: "group" }, this.program, this.photo, this.chooser.element),
-      h("div", { class: "group" }, this.start, this.settings.quality, this.pause, this.goOn, this.stop, wrap),
+      h("div", { class: "group" }, this.start, this.settings.quality, this.pause, this.goOn, this.stop, wrap, helpButton()),
       h("div", { class: "progress" }, this.status, this.bar),
-      helpButton(),
       this.found,
     );
     document.addEventListener("keydown", (event) => {
@@ -129,7 +128,8 @@ export class TopBar {
     const isOfSession = (r: Run) => {
       return r.session === session?.session && JSON.stringify(r.observe) === observe;
     };
-    this.settings.setTried(runs.some((r) => isOfSession(r) && r.state !== "failed"));
+    const tried = runs.filter((r) => isOfSession(r) && r.state !== "failed");
+    this.settings.setTried(tried.length > 0);
     this.pause.hidden = run?.state !== "running" && run?.state !== "waiting";
     this.goOn.hidden = !run || !canGoOn(run);
     this.stop.hidden = !run || !isLive(run);
@@ -140,7 +140,7 @@ export class TopBar {
     fill(this.status, ...(run ? statusOf(run) : ["No run yet"]));
     fill(
       this.found,
-      run?.found ? verdict(run.found) : null,
+      run?.found ? verdict(run.found, tried.length === 1 && tried[0] === run) : null,
       warnings.length > 0 ? warningList(warnings) : null,
     );
     this.found.hidden = this.found.childElementCount === 0;
@@ -153,11 +153,12 @@ export class TopBar {
 }
 
 /** Whether the object was found; of options of the command line the page has its own. */
-function verdict(found: string): HTMLElement {
+function verdict(found: string, isFirst: boolean): HTMLElement {
   const text = found.replace(/ \([^()]*--[^()]*\)/g, "");
   const isFound = /^found/i.test(text);
   const kind = isFound ? "is-found" : /^perhaps/i.test(text) ? "perhaps" : "not-found";
-  const help = isFound ? "" : ". Point it out with the tools over the photograph, then Start again.";
+  const more = isFirst ? "Start again for more time, or point" : "Point";
+  const help = isFound ? "" : `. ${more} it out with the tools over the photograph.`;
   return h("p", { class: kind }, text.replace(/\.$/, help ? "" : "."), help);
 }
 

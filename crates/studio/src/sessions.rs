@@ -59,8 +59,8 @@ pub struct OpenSession {
     pub job: Job,
     /// The message at its opening.
     pub note: String,
-    /// It was opened at a state of a run, not at a draw from the prior.
-    is_of_run: bool,
+    /// The revision at which its state was drawn from the prior; none at a state of a run.
+    drawn: Option<u64>,
 }
 
 /// Makes the job of a program that observes some files.
@@ -184,14 +184,15 @@ impl OpenSession {
     fn of_run(run: &Reopened, seed: u64, stop: Stop) -> Result<Self, Failure> {
         let (mut session, said) = run.session(seed, stop)?;
         session.confine(Path::new("."));
-        Ok(OpenSession { session, job: run.job.clone(), note: said.text, is_of_run: true })
+        Ok(OpenSession { session, job: run.job.clone(), note: said.text, drawn: None })
     }
 
     fn of(program: Program, job: Job, stop: Stop) -> Result<Self, Failure> {
         let (program, _) = inputs::observe(program, &job)?;
         let (mut session, said) = Session::open(program, job.sampling.seed, stop)?;
         session.confine(Path::new("."));
-        Ok(OpenSession { session, job, note: said.text, is_of_run: false })
+        let drawn = Some(session.revision());
+        Ok(OpenSession { session, job, note: said.text, drawn })
     }
 
     /// Shows the image that it observes.
@@ -271,6 +272,7 @@ impl OpenSession {
         self.session.take_over(session, "another hint");
         self.job.inputs.hint = hint;
         self.note = said.text;
+        self.drawn = Some(self.session.revision());
         Ok(())
     }
 
@@ -283,7 +285,9 @@ impl OpenSession {
 
     fn take_over(&mut self, other: OpenSession, what: &str) {
         self.session.take_over(other.session, what);
-        (self.job, self.note, self.is_of_run) = (other.job, other.note, other.is_of_run);
+        let is_drawn = other.drawn.is_some();
+        (self.job, self.note) = (other.job, other.note);
+        self.drawn = is_drawn.then(|| self.session.revision());
     }
 
     /// Writes the program to its file if it was changed, so that a run can read it. An
@@ -328,7 +332,7 @@ impl OpenSession {
             "params": params,
             "revision": s.revision(),
             "log_joint": finite(s.trace().log_joint()),
-            "is_prior": !self.is_of_run && undo.is_none(),
+            "is_prior": self.drawn == Some(s.revision()),
             "undo": undo,
             "redo": redo,
             "has_view": view.is_some(),
@@ -396,7 +400,7 @@ fn presets(job: &Job) -> Vec<Value> {
     }
     let of = |q: Quality| {
         let preset = presets.of_quality(q)?.preset;
-        let about = format!("{:.0} s, error {} ({})", preset.seconds, preset.error, presets.error);
+        let about = format!("{} s, error {} ({})", preset.seconds, preset.error, presets.error);
         Some(json!({ "name": q.name(), "about": about }))
     };
     Quality::ALL.into_iter().filter_map(of).collect()
