@@ -147,7 +147,7 @@ export class Actions {
     const { folder, runs } = this.store.now;
     const wanted = this.store.now.session?.session ?? place.session;
     const sessions = folder?.sessions ?? [];
-    const id = wanted !== null && sessions.includes(wanted) ? wanted : sessions[0];
+    const id = wanted !== null && sessions.includes(wanted) ? wanted : sessions[sessions.length - 1];
     if (id !== undefined) {
       await this.showSession(id);
     } else if (this.store.now.session) {
@@ -277,7 +277,9 @@ export class Actions {
     if (!session) return null;
     const params = { session: session.session, text, photo };
     const next = await this.connection.ask<P.Session>("replace", params);
-    this.store.set({ session: next });
+    // What was applied is shown; a run of other data is no longer.
+    const same = JSON.stringify(next.observe) === JSON.stringify(session.observe);
+    this.store.set({ session: next, ...(same ? { view: "session", at: null } : NO_RUN) });
     return next;
   }
 

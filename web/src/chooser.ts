@@ -7,7 +7,9 @@ import { button, h } from "./dom";
 import type { ErrorBox } from "./errors";
 
 const PICTURES = "image/png,image/jpeg";
-const FIRST = `// A value that nobody knows, and what is known of it: change them, then Start.
+const FIRST = `// A value that nobody knows,
+// and what was seen of it:
+// change them, then Start.
 assume mean ~ normal(0, 10);
 observe normal(mean, 1) = 3.2 as seen;
 `;

@@ -81,8 +81,10 @@ export class ProgramPanel {
   /** A session was opened: its program comes to the front, with edits not yet applied. */
   private showSession(session: Session | Wanting): void {
     const file = session.program || "untitled.pcad";
-    this.files = this.files.filter((f) => f.file !== file);
-    const draft = sessionStorage.getItem(this.draftKey(session.session, file));
+    const before = this.files.find((f) => f.file === file);
+    this.files = this.files.filter((f) => f !== before);
+    const edited = before && before.text !== before.base ? before.text : null;
+    const draft = edited ?? sessionStorage.getItem(this.draftKey(session.session, file));
     const opened = this.add(file, session.text, draft ?? session.text);
     this.files = [opened, ...this.files.filter((f) => f !== opened && f.text !== f.base)];
     this.show(opened);
@@ -210,22 +212,24 @@ export class ProgramPanel {
   /** Makes the session that of the text on screen: what Start runs is what is seen. Fails with
    * the mistake, which is marked. */
   async commit(): Promise<void> {
-    const { current } = this;
-    if (!current) return;
     const { session } = this.actions.store.now;
-    const isOther = current.file !== this.sessionFile;
-    if (!isOther && current.text === current.base) return;
+    const own = this.files.find((f) => f.file === this.sessionFile);
+    // A file that is open beside the session's counts only while it is in sight.
+    const isSeen = this.element.checkVisibility({ visibilityProperty: true });
+    const shown = isSeen ? this.current : (own ?? this.current);
+    if (!shown || (shown === own && shown.text === shown.base)) return;
     try {
-      if (isOther || !session) {
-        await this.useProgram(current);
+      if (shown !== own || !session) {
+        await this.useProgram(shown);
         return;
       }
-      const next = await this.actions.replace(this.view.state.doc.toString());
+      const next = await this.actions.replace(shown.text);
       if (!next) return;
-      current.base = next.text;
-      this.changed(current, this.view.state.doc.toString());
+      shown.base = next.text;
+      this.changed(shown, shown.text);
     } catch (error) {
-      if (error instanceof Refusal) showDiagnostics(this.view, error.diagnostics);
+      const isMarked = error instanceof Refusal && shown === this.current;
+      if (isMarked) showDiagnostics(this.view, error.diagnostics);
       throw error;
     }
     this.error.clear();

@@ -7,6 +7,7 @@
 #[macro_use]
 extern crate pcadlang_runs;
 
+mod advice;
 mod app;
 mod args;
 mod examples;
