@@ -16,6 +16,8 @@ export async function first({ open, step, out, start }) {
     await together({ page, step, open, program });
     const phone = await open({ address: program.address, width: 390, height: 844 });
     await small({ page: phone.page, step, out });
+    // A page whose program is gone would report that.
+    for (const opened of [page, phone.page]) await opened.context().close();
   } finally {
     await program.end();
   }
@@ -224,7 +226,7 @@ async function together({ page, step, open, program }) {
     await until(async () => (await chooser(other).inputValue()) === "coin.pcad", "not followed");
     await other.locator(".told", { hasText: "Another tab opened coin.pcad" }).waitFor();
     check(await page.locator(".told").isHidden(), "a tab hears of itself");
-    await other.close();
+    await other.context().close();
   });
 }
 
