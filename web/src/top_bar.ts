@@ -2,6 +2,7 @@
 
 import type { Actions } from "./actions";
 import { Chooser } from "./chooser";
+import { Refusal } from "./connection";
 import { button, duration, fill, h, number, select, setOptions } from "./dom";
 import { ErrorBox } from "./errors";
 import { helpButton } from "./help";
@@ -128,7 +129,7 @@ export class TopBar {
     const isOfSession = (r: Run) => {
       return r.session === session?.session && JSON.stringify(r.observe) === observe;
     };
-    const tried = runs.filter((r) => isOfSession(r) && r.state !== "failed");
+    const tried = runs.filter(isOfSession);
     this.settings.setTried(tried.length > 0);
     this.pause.hidden = run?.state !== "running" && run?.state !== "waiting";
     this.goOn.hidden = !run || !canGoOn(run);
@@ -147,7 +148,7 @@ export class TopBar {
     const failed = run?.error ? `${run.run} ${run.error}` : "";
     if (failed === this.failed) return;
     this.failed = failed;
-    if (run?.error) this.runError.show(new Error(run.error));
+    if (run?.error) this.runError.show(failure(run.error));
     else this.runError.clear();
   }
 }
@@ -160,6 +161,13 @@ function verdict(found: string, isFirst: boolean): HTMLElement {
   const more = isFirst ? "Start again for more time, or point" : "Point";
   const help = isFound ? "" : `. ${more} it out with the tools over the photograph.`;
   return h("p", { class: kind }, text.replace(/\.$/, help ? "" : "."), help);
+}
+
+/** Why a run failed; a time that is too short is no fault of the program. */
+function failure(error: string): Error {
+  if (!/stopped in the middle of an evaluation/.test(error)) return new Error(error);
+  const hint = "Start again with the preset `accurate`, or give it a time under Settings";
+  return new Refusal("The run ended before it had a first state: it needs more time", hint);
 }
 
 /** The warnings of a run; they unfold. */

@@ -32,7 +32,8 @@ fn a_program_that_needs_a_photograph_asks_for_it_and_gets_the_example() {
     let said = page.answer("open", json!({ "program": "open.pcad" }))["error"].to_string();
     assert!(said.contains("param n = 10") && !said.contains("--"), "{said}");
     // A mistake of the program itself is told as such.
-    std::fs::write(s.folder.join("wrong.pcad"), "data photo: image; let x = [1][2];").unwrap();
+    std::fs::write(s.folder.join("wrong.pcad"), "data photo: image; assume x ~ normal(0, [1][2]);")
+        .unwrap();
     assert!(page.refused("open", json!({ "program": "wrong.pcad" })).contains("index"));
 }
 
