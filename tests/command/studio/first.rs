@@ -34,7 +34,7 @@ fn a_program_that_needs_a_photograph_asks_for_it_and_gets_the_example() {
     // A mistake of the program itself is told as such.
     std::fs::write(s.folder.join("wrong.pcad"), "data photo: image; assume x ~ normal(0, [1][2]);")
         .unwrap();
-    assert!(page.refused("open", json!({ "program": "wrong.pcad" })).contains("index"));
+    assert!(page.refused("open", json!({ "program": "wrong.pcad" })).contains("no element 2"));
 }
 
 #[test]
