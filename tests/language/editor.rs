@@ -160,7 +160,8 @@ fn completions_fit_the_place() {
     };
     let words = |text: &str| complete(text).1.into_iter().map(|(w, _)| w).collect::<Vec<_>>();
     assert_eq!(words("let width = 1; let y = wid"), ["width"]);
-    assert!(words("assume x ~ nor").contains(&"normal".to_owned()));
+    assert_eq!(words("let norms = 1; assume x ~ nor"), ["normal", "norms"]);
+    assert!(words("let y = nor").contains(&"norm".to_owned()));
     assert!(words("assume x ~ normal(0, s").contains(&"sd = ".to_owned()));
     assert!(
         words("fn f(first, second) { first }\nlet y = f(sec").contains(&"second = ".to_owned())

@@ -1,4 +1,4 @@
-// Starts the program on a temporary folder with photographs, and ends it.
+// Starts the program on a temporary folder, and ends it.
 
 import { spawn } from "node:child_process";
 import { cpSync, mkdtempSync, rmSync } from "node:fs";
@@ -8,10 +8,11 @@ import { fileURLToPath } from "node:url";
 
 const images = fileURLToPath(new URL("../../examples/images", import.meta.url));
 
-/** Starts `pcadlang studio` on a folder with copies of the example photographs. */
+/** Starts `pcadlang studio`: with arguments on a folder with copies of the example photographs,
+ * without them on an empty one. */
 export async function startProgram(binary, ...more) {
   const folder = mkdtempSync(join(tmpdir(), "pcadlang-studio-"));
-  cpSync(images, join(folder, "images"), { recursive: true });
+  if (more.length > 0) cpSync(images, join(folder, "images"), { recursive: true });
   const child = spawn(binary, ["studio", ...more, "--port", "0"], {
     cwd: folder,
     stdio: ["ignore", "pipe", "pipe"],

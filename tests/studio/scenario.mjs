@@ -28,7 +28,7 @@ export async function scenario({ open, step, out, program }) {
   await step("a photograph is stored and observed", async () => {
     const before = await pixels(page, PICTURE);
     const file = join(program.folder, "images", "skier.jpg");
-    await page.locator('input[type="file"]').setInputFiles(file);
+    await page.locator('input[accept^="image"]').setInputFiles(file);
     const photo = page.getByLabel("Photograph", { exact: true });
     await until(
       async () => (await photo.inputValue()).startsWith("pictures/"),

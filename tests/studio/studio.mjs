@@ -10,6 +10,7 @@ import { parseArgs } from "node:util";
 import { openPage, startBrowser } from "./browser.mjs";
 import { startProgram } from "./program.mjs";
 import { appearance } from "./appearance.mjs";
+import { first } from "./first.mjs";
 import { hint } from "./hint.mjs";
 import { keyboard } from "./keyboard.mjs";
 import { language } from "./language.mjs";
@@ -86,6 +87,7 @@ async function step(name, task) {
 
 try {
   const tools = { open, step, out, update: values.update, program, viewer: values.page };
+  await first({ ...tools, start: () => startProgram(resolve(binary)) });
   await appearance(tools);
   await scenario(tools);
   await language(tools);

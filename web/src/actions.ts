@@ -1,10 +1,11 @@
 // The state of the page, with the listeners to its changes, and the requests of the user, each as
 // one method; results go into the state. Panels read from here and never from each other.
 
-import { Latest, type Connection } from "./connection";
+import { Latest, Refusal, type Connection } from "./connection";
 import type { Place } from "./fragment";
 import type * as P from "./protocol";
-import { isLive } from "./protocol";
+import { isEmpty } from "./pointing";
+import { imageItem, isLive, runName } from "./protocol";
 
 /** The states that the viewer shows. */
 export type View = "session" | "best" | "draws" | "film" | "modes";
@@ -13,6 +14,10 @@ export interface Known {
   connected: boolean;
   folder: P.Folder | null;
   session: P.Session | null;
+  /** The chosen program, while it cannot be opened without its data. */
+  wanting: P.Wanting | null;
+  /** The photograph at hand, a file of the folder, whether or not a program takes it. */
+  photo: string | null;
   /** All runs of the folder, newest last. */
   runs: P.Run[];
   /** The run that is looked at. */
@@ -21,6 +26,8 @@ export interface Known {
   draws: P.Draws | null;
   /** How many modes that run has; 0 until it ended. */
   modes: number;
+  /** What that run warns of, once it has ended. */
+  warnings: string[];
   view: View;
   /** The place of the slider in `view`; null: its end. */
   at: number | null;
@@ -45,10 +52,13 @@ export class Store {
     connected: false,
     folder: null,
     session: null,
+    wanting: null,
+    photo: null,
     runs: [],
     run: null,
     draws: null,
     modes: 0,
+    warnings: [],
     view: "session",
     at: null,
     tab: "trace",
@@ -91,6 +101,18 @@ export class Store {
   }
 }
 
+const PHOTO_HINT = "drop one on the page, or choose one at the top: the example, or a file";
+
+/** No run is looked at: nothing of the one before stays in sight. */
+const NO_RUN: Pick<Known, "run" | "draws" | "modes" | "warnings" | "at" | "view"> = {
+  run: null,
+  draws: null,
+  modes: 0,
+  warnings: [],
+  at: null,
+  view: "session",
+};
+
 const VIEWS: View[] = ["session", "best", "draws", "film", "modes"];
 
 /** The page's dealings with the program. */
@@ -98,7 +120,9 @@ export class Actions {
   /** Shows an error that belongs to no panel. */
   onError: (error: unknown) => void = () => {};
   /** Replaces the editor's text by a session's that was just opened. */
-  onOpened: (session: P.Session) => void = () => {};
+  onOpened: (session: P.Session | P.Wanting) => void = () => {};
+  /** Says what another tab did, with what can be done about it. */
+  onTold: (text: string, act?: { name: string; task: () => Promise<void> }) => void = () => {};
 
   private readonly folder = new Latest<void>(() => this.readFolder(), (e) => this.onError(e));
   private readonly session = new Latest<void>(() => this.readSession(), (e) => this.onError(e));
@@ -106,6 +130,8 @@ export class Actions {
   private readonly hints = new Latest<Hinted>((asked) => this.sendHint(asked));
   /** The last session that this page opened. */
   private opened: number | null = null;
+  /** What this page opens or starts itself is no news: its events wait for the answer. */
+  private own: Promise<unknown> = Promise.resolve();
   private drawsTimer: ReturnType<typeof setTimeout> | null = null;
 
   constructor(
@@ -121,13 +147,11 @@ export class Actions {
     const { folder, runs } = this.store.now;
     const wanted = this.store.now.session?.session ?? place.session;
     const sessions = folder?.sessions ?? [];
-    const id = wanted !== null && sessions.includes(wanted) ? wanted : sessions[0];
+    const id = wanted !== null && sessions.includes(wanted) ? wanted : sessions[sessions.length - 1];
     if (id !== undefined) {
-      const session = await this.connection.ask<P.Session>("session", { session: id });
-      this.store.set({ session });
-      this.onOpened(session);
-    } else {
-      this.store.set({ session: null });
+      await this.showSession(id);
+    } else if (this.store.now.session) {
+      this.store.set({ session: null, ...NO_RUN });
     }
     const run = runs.find((r) => r.run === place.run) ?? runs.find((r) => r.session === id);
     const view = VIEWS.find((v) => v === place.view) ?? (run ? "best" : "session");
@@ -135,39 +159,96 @@ export class Actions {
     await Promise.all([this.readDraws(), this.readModes()]);
   }
 
-  /** Opens a session of a program file. */
-  async openProgram(program: string, observe: string[] = []): Promise<void> {
+  /** Opens a session of a program file, with the photograph at hand if it takes one. */
+  openProgram(program: string): Promise<void> {
+    return this.mine(async () => this.open(program));
+  }
+
+  private async open(program: string): Promise<void> {
     await this.hints.rest;
-    const before = this.store.now.session;
-    let session = await this.connection.ask<P.Session>("open", { program, observe });
-    // The same photograph keeps its hint.
-    if (session.photo && JSON.stringify(before?.observe) === JSON.stringify(observe)) {
-      const params = { session: session.session, hint: before!.hint };
-      session = await this.connection.ask<P.Session>("hint", params);
+    const { session: before, photo } = this.store.now;
+    const params = { program, photo };
+    let session = await this.connection.ask<P.Session | P.Wanting>("open", params);
+    if (session.session === null) {
+      this.store.set({ session: null, wanting: session, ...NO_RUN });
+      await this.closeLast(null);
+    } else {
+      // The same photograph keeps its hint.
+      const same = session.photo !== null && session.photo.name === before?.photo?.name;
+      if (same && !isEmpty(before.hint)) {
+        const params = { session: session.session, hint: before.hint };
+        session = await this.connection.ask<P.Session>("hint", params);
+      }
+      this.store.set({ session, wanting: null, ...NO_RUN });
+      await this.closeLast(session.session);
     }
-    await this.closeLast(session.session);
-    this.store.set({ session, view: "session", run: null, draws: null, modes: 0, at: null });
     this.onOpened(session);
     await this.readFolder();
+  }
+
+  /** Shows a session that is open. */
+  async showSession(id: number): Promise<void> {
+    const session = await this.connection.ask<P.Session>("session", { session: id });
+    const { session: before, photo } = this.store.now;
+    const kept = before?.session === id ? {} : NO_RUN;
+    this.store.set({ session, wanting: null, photo: session.photo?.name ?? photo, ...kept });
+    this.onOpened(session);
   }
 
   /** Opens a session at the best state of a run. */
-  async openRun(run: string): Promise<void> {
+  openRun(run: string): Promise<void> {
+    return this.mine(async () => this.edit(run));
+  }
+
+  private async edit(run: string): Promise<void> {
     // The run stays in view: its draws are the ghosts behind what is edited.
     const session = await this.connection.ask<P.Session>("open", { run });
+    const photo = session.photo?.name ?? this.store.now.photo;
+    this.store.set({ session, wanting: null, photo, view: "session" });
     await this.closeLast(session.session);
-    this.store.set({ session, view: "session" });
     this.onOpened(session);
     await this.readFolder();
   }
 
-  /** Gives the session other data; without a session nothing can take them. */
-  async observe(observe: string[]): Promise<void> {
-    const session = this.store.now.session;
-    if (!session) throw new Error("open a program first: a photograph is observed by one");
+  /** Takes another photograph, or none; a program that takes one observes it. */
+  async choosePhoto(photo: string | null): Promise<void> {
     await this.hints.rest;
-    const params = { session: session.session, observe };
-    this.store.set({ session: await this.connection.ask("observe", params), view: "session" });
+    const { session, wanting } = this.store.now;
+    const image = imageItem(session?.data ?? []);
+    if (session && image) {
+      const others = session.observe.filter((o) => {
+        return o.includes("=") && !o.startsWith(`${image.name}=`);
+      });
+      const observe = photo === null ? others : [`${image.name}=${photo}`, ...others];
+      const params = { session: session.session, observe };
+      const next = await this.connection.ask<P.Session>("observe", params);
+      this.store.set({ session: next, photo, ...NO_RUN });
+      return;
+    }
+    this.store.set({ photo });
+    if (wanting && photo !== null) await this.openProgram(wanting.program);
+  }
+
+  /** Takes a photograph that comes with pcadlang. */
+  async chooseExample(picture: string): Promise<void> {
+    const { file } = await this.connection.ask<{ file: string }>("example", { picture });
+    await this.choosePhoto(file);
+  }
+
+  /** Stores a program that was chosen or dropped, beside others of its name, and opens it. */
+  async takeProgram(name: string, text: string): Promise<void> {
+    const stem = name.replace(/\.pcad$/, "");
+    const own = (this.store.now.folder?.programs ?? []).filter((p) => !p.shipped);
+    for (let n = 1; ; n++) {
+      const file = n === 1 ? `${stem}.pcad` : `${stem}-${n}.pcad`;
+      const exists = own.some((p) => p.file === file);
+      const there = exists
+        ? (await this.connection.ask<{ text: string }>("read", { file })).text
+        : null;
+      if (there !== null && there !== text) continue;
+      if (there === null) await this.connection.ask("write", { file, text });
+      return this.openProgram(file);
+    }
   }
 
   /** Says where the object is in the session's photograph; of several hints the last one counts. */
@@ -190,19 +271,15 @@ export class Actions {
     return this.hints.busy;
   }
 
-  /** Gives the session a photograph; its other data stay. */
-  async observePicture(file: string): Promise<void> {
-    const others = (this.store.now.session?.observe ?? []).filter((o) => o.includes("="));
-    await this.observe([file, ...others]);
-  }
-
   /** Replaces the session's program; shared choices keep their values. */
   async replace(text: string): Promise<P.Session | null> {
-    const session = this.store.now.session;
+    const { session, photo } = this.store.now;
     if (!session) return null;
-    const params = { session: session.session, text };
+    const params = { session: session.session, text, photo };
     const next = await this.connection.ask<P.Session>("replace", params);
-    this.store.set({ session: next });
+    // What was applied is shown; a run of other data is no longer.
+    const same = JSON.stringify(next.observe) === JSON.stringify(session.observe);
+    this.store.set({ session: next, ...(same ? { view: "session", at: null } : NO_RUN) });
     return next;
   }
 
@@ -216,11 +293,25 @@ export class Actions {
   /** Starts a run of the session's program. */
   async run(settings: P.Settings): Promise<void> {
     await this.hints.rest;
-    const session = this.store.now.session;
-    if (!session) return;
-    const run = await this.connection.ask<P.Run>("run", { session: session.session, settings });
-    this.keep(run);
-    this.choose(run.run, "best");
+    const { session, wanting } = this.store.now;
+    if (!session) {
+      throw wanting
+        ? new Refusal(`${wanting.program} needs a photograph`, PHOTO_HINT)
+        : new Refusal("There is no program to run", "choose one at the top, or drop its file");
+    }
+    const params = { session: session.session, settings };
+    await this.mine(async () => {
+      const run = await this.connection.ask<P.Run>("run", params);
+      this.keep(run);
+      this.choose(run.run, "best");
+    });
+  }
+
+  /** Opens or starts something: the events of it are no news of other tabs. */
+  private mine(task: () => Promise<void>): Promise<void> {
+    const done = task();
+    this.own = done.catch(() => {});
+    return done;
   }
 
   /** Pauses, goes on with, or stops a run. */
@@ -231,7 +322,7 @@ export class Actions {
   /** Forgets a run that ended; its folder stays. */
   async remove(run: string): Promise<void> {
     await this.connection.ask("remove", { run });
-    if (this.store.now.run === run) this.store.set({ run: null, view: "session", draws: null });
+    if (this.store.now.run === run) this.store.set(NO_RUN);
     await this.readFolder();
   }
 
@@ -241,7 +332,7 @@ export class Actions {
       this.store.set({ view });
       return;
     }
-    this.store.set({ run, view, at: null, draws: null, modes: 0 });
+    this.store.set({ ...NO_RUN, run, view });
     this.draws.call();
     this.readModes().catch((e) => this.onError(e));
   }
@@ -262,7 +353,7 @@ export class Actions {
 
   /** Closes the session that this page opened before: their number is limited. Those that
    * other pages opened, or that runs still work for, stay. */
-  private async closeLast(next: number): Promise<void> {
+  private async closeLast(next: number | null): Promise<void> {
     const last = this.opened;
     this.opened = next;
     const works = this.store.now.runs.some((run) => run.session === last && isLive(run));
@@ -272,14 +363,56 @@ export class Actions {
 
   private take(event: P.Event): void {
     if (event.event === "folder") this.folder.call();
-    else if (event.event === "run") this.keep(event.run);
-    else {
+    else if (event.event === "run") {
+      const isKnown = this.store.now.runs.some((r) => r.run === event.run.run);
+      this.keep(event.run);
+      if (!isKnown && this.store.now.folder) void this.own.then(() => this.tellRun(event.run));
+    } else if (event.event === "opened") {
+      void this.own.then(() => this.tellOpened(event));
+    } else if (event.event === "closed") {
+      void this.own.then(() => this.followClosed(event.session));
+    } else {
       const { session, dragging } = this.store.now;
       if (session?.session !== event.session) return;
       if (event.revision <= session.revision) return;
       this.store.set({ session: { ...session, revision: event.revision } });
       if (!dragging) this.session.call();
     }
+  }
+
+  /** A run that another tab started: in the same session it is shown here, too. */
+  private tellRun({ run, session, state }: P.Run): void {
+    const { now } = this.store;
+    if (session === null || run === now.run || state === "done" || state === "failed") return;
+    const text = `Another tab started ${runName(run)}.`;
+    if (session === now.session?.session) {
+      this.choose(run);
+      this.onTold(text);
+    } else {
+      this.onTold(text, { name: "Look", task: async () => this.choose(run) });
+    }
+  }
+
+  private tellOpened({ session, program }: { session: number; program: string }): void {
+    const { now } = this.store;
+    if (now.session?.session === session || !now.folder) return;
+    const task = () => this.showSession(session);
+    this.onTold(`Another tab opened ${program}.`, { name: "Show it here", task });
+  }
+
+  /** Another tab opened something else in place of this page's session: so does this page. */
+  private async followClosed(closed: number): Promise<void> {
+    if (this.store.now.session?.session !== closed) return;
+    await this.readFolder();
+    const sessions = this.store.now.folder?.sessions ?? [];
+    const next = sessions[sessions.length - 1];
+    if (next === undefined) {
+      this.store.set({ session: null, ...NO_RUN });
+      this.onTold("Another tab closed the program.");
+      return;
+    }
+    await this.showSession(next);
+    this.onTold(`Another tab opened ${this.store.now.session?.program}, which is shown here, too.`);
   }
 
   private keep(run: P.Run): void {
@@ -311,7 +444,11 @@ export class Actions {
     if (id === undefined) return;
     const session = await this.connection.ask<P.Session>("session", { session: id });
     const now = this.store.now.session;
-    if (now?.session === id && session.revision >= now.revision) this.store.set({ session });
+    if (now?.session !== id || session.revision < now.revision) return;
+    // Another tab may have chosen another photograph.
+    const same = session.photo?.name === now.photo?.name;
+    const photo = same ? {} : { photo: session.photo?.name ?? null, ...NO_RUN };
+    this.store.set({ session, ...photo });
   }
 
   private async readDraws(): Promise<void> {
@@ -329,6 +466,7 @@ export class Actions {
     const run = this.store.currentRun;
     if (!run || isLive(run) || run.state === "failed") return;
     const summary = await this.connection.ask<P.Summary>("summary", { run: run.run });
-    if (this.store.now.run === run.run) this.store.set({ modes: summary.modes.length });
+    if (this.store.now.run !== run.run) return;
+    this.store.set({ modes: summary.modes.length, warnings: summary.warnings });
   }
 }

@@ -11,6 +11,8 @@ import { StudioData } from "./studio_data";
 export class ComparePanel extends Panel {
   readonly element: HTMLElement;
   private a: string | null = null;
+  /** The user chose the first run; otherwise it is the one looked at. */
+  private isChosen = false;
   private b: string | null = null;
   private readonly selects = [
     select([], "", (run) => this.pick("a", run), { "aria-label": "First run" }),
@@ -34,6 +36,7 @@ export class ComparePanel extends Panel {
 
   private pick(which: "a" | "b", run: string): void {
     this[which] = run;
+    this.isChosen = true;
     this.show();
   }
 
@@ -45,7 +48,7 @@ export class ComparePanel extends Panel {
       fill(this.figures);
       return;
     }
-    if (!this.a || !usable.includes(this.a)) {
+    if (!this.a || !usable.includes(this.a) || !this.isChosen) {
       this.a = run && usable.includes(run) ? run : usable[usable.length - 1]!;
     }
     if (!this.b || !usable.includes(this.b) || this.b === this.a) {

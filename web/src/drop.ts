@@ -1,10 +1,11 @@
-// Photographs dropped anywhere on the page.
+// Photographs and programs dropped anywhere on the page.
 
 import { h } from "./dom";
 
-/** Calls back with each picture that is dropped; the page says so while one is held over it. */
+/** Calls back with each file that is dropped; the page says so while one is held over it. */
 export function acceptDrops(root: HTMLElement, take: (file: File) => void): void {
-  const hint = h("div", { class: "drop-hint", hidden: true }, "Drop the photograph to observe it");
+  const text = "Drop a photograph (PNG, JPEG) or a program (.pcad)";
+  const hint = h("div", { class: "drop-hint", hidden: true }, text);
   root.append(hint);
   const holdsFiles = (event: DragEvent) => event.dataTransfer?.types.includes("Files") ?? false;
   document.addEventListener("dragover", (event) => {

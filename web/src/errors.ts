@@ -15,6 +15,11 @@ export function explain(error: unknown): { message: string; hint: string | null 
   return { message: String(error), hint: null };
 }
 
+/** True if there is nothing to draw, which is no mistake. */
+export function isWithoutScene(error: unknown): boolean {
+  return error instanceof Refusal && error.message.startsWith("the program has no view");
+}
+
 /** A place for an error, empty until one is shown. */
 export class ErrorBox {
   readonly element = h("div", { class: "error-box", role: "alert", hidden: true });

@@ -4,7 +4,7 @@ import "./style.css";
 import "uplot/dist/uPlot.min.css";
 import { Actions, Store } from "./actions";
 import { Connection } from "./connection";
-import { button, h } from "./dom";
+import { button, fill, h } from "./dom";
 import { acceptDrops } from "./drop";
 import { ComparePanel } from "./compare_panel";
 import { ErrorBox } from "./errors";
@@ -29,13 +29,26 @@ const actions = new Actions(connection, store);
 // Until everything is read, the address says what shall be opened.
 let loaded = false;
 
+/** What another tab did. */
+const told = h("div", { class: "banner told", role: "status", hidden: true });
+actions.onTold = (text, act) => {
+  const close = button("×", () => (told.hidden = true), { class: "quiet", "aria-label": "Dismiss" });
+  const task = () => {
+    told.hidden = true;
+    void errors.guard(act!.task);
+  };
+  fill(told, text, act ? button(act.name, task) : null, close);
+  told.hidden = false;
+};
+
 const banner = h("div", { class: "banner", role: "status", hidden: true });
 const errors = new ErrorBox();
 actions.onError = (error) => errors.show(error);
 
 const bar = new TopBar(actions);
 const program = new ProgramPanel(actions);
-const scene = new ScenePanel(actions);
+bar.onStart = () => program.commit();
+const scene = new ScenePanel(actions, bar.chooser);
 
 const programTab = h("div", { class: "panel program-tab" });
 const tabOf = (key: string, name: string, panel: Pick<Panel, "element" | "setVisible">): Tab => {
@@ -66,6 +79,7 @@ const left = h("aside", { class: "left", "aria-label": "Program" });
 const root = document.getElementById("studio")!;
 root.append(
   banner,
+  told,
   bar.element,
   bar.error.element,
   bar.runError.element,
@@ -100,7 +114,18 @@ store.on(["tab"], () => tabs.choose(store.now.tab));
 tabs.choose(place.tab ?? "trace");
 store.set({ tab: place.tab ?? "trace" });
 arrange();
-acceptDrops(root, (file) => void bar.error.guard(() => bar.take(file)));
+acceptDrops(root, (file) => bar.chooser.take(file));
+// A program without a scene gives its room to the tabs; on the first page there is nothing for them.
+store.on(["session", "wanting", "run", "runs"], () => {
+  const { session, wanting, run, runs, tab } = store.now;
+  const first = session === null && runs.length === 0;
+  root.classList.toggle("first", first);
+  root.classList.toggle("blank", first && wanting === null);
+  const of = store.currentRun;
+  const flat = session !== null && !session.has_view && (!of || of.session === session.session);
+  root.classList.toggle("flat", flat);
+  if (flat && run !== null && tab === "trace") store.set({ tab: "plots" });
+});
 
 connection.onChange = (connected) => {
   store.set({ connected });
@@ -118,4 +143,5 @@ connection.onChange = (connected) => {
       : "Open the address that `pcadlang studio` printed: this one has no token.";
   }
 };
+root.classList.add("first", "blank");
 connection.connect();

@@ -2,7 +2,7 @@
 
 import { Disconnected, Latest } from "./connection";
 import { h, select, setOptions } from "./dom";
-import { ErrorBox } from "./errors";
+import { ErrorBox, isWithoutScene } from "./errors";
 import { LAYERS, type Camera, type Vec3 } from "./protocol";
 import type { ImageUrl, ViewerData } from "./viewer";
 
@@ -184,6 +184,10 @@ export class PictureView {
     // While the connection is lost the last picture stays: the banner says what is wrong.
     if (error instanceof Disconnected) return;
     void this.show(null);
+    if (isWithoutScene(error)) {
+      this.setEmpty("This program draws no scene: its draws are under Plots.");
+      return;
+    }
     this.empty.hidden = true;
     this.error.show(error);
   }

@@ -9,7 +9,7 @@ import { button, fill, h, select, setOptions } from "./dom";
 import { editorState, replaceText, showDiagnostics } from "./editor";
 import { ErrorBox } from "./errors";
 import { LanguageServer } from "./language";
-import type { Session } from "./protocol";
+import type { Session, Wanting } from "./protocol";
 
 interface OpenFile {
   file: string;
@@ -19,8 +19,7 @@ interface OpenFile {
   text: string;
 }
 
-// Not names of files: these have an ending.
-const NEW = "new";
+// Not the name of a file: these have an ending.
 const SAVE_AS = "save as";
 
 /** Programs, and what is done with them. */
@@ -36,6 +35,7 @@ export class ProgramPanel {
   private readonly open = select([["", "Open …"]], "", (file) => this.openFile(file), {
     "aria-label": "Open a program beside this one",
   });
+  private readonly none = h("div", { class: "empty" }, "No program is chosen yet.");
   private readonly server: LanguageServer;
 
   constructor(private readonly actions: Actions) {
@@ -54,6 +54,7 @@ export class ProgramPanel {
       this.error.element,
     );
     this.describe();
+    this.element.querySelector(".editor")!.prepend(this.none);
     actions.onOpened = (session) => this.showSession(session);
     store.on(["folder"], () => this.showFolder());
     store.on(["session"], () => this.follow());
@@ -66,22 +67,24 @@ export class ProgramPanel {
     });
     const first: [string, string][] = [
       ["", "Open …"],
-      [NEW, "New program …"],
       [SAVE_AS, "Save as …"],
     ];
     setOptions(this.open, [...first, ...options], "");
   }
 
   private get sessionFile(): string | null {
-    const session = this.actions.store.now.session;
-    return session ? session.program || "untitled.pcad" : null;
+    const { session, wanting } = this.actions.store.now;
+    const opened = session ?? wanting;
+    return opened ? opened.program || "untitled.pcad" : null;
   }
 
   /** A session was opened: its program comes to the front, with edits not yet applied. */
-  private showSession(session: Session): void {
+  private showSession(session: Session | Wanting): void {
     const file = session.program || "untitled.pcad";
-    this.files = this.files.filter((f) => f.file !== file);
-    const draft = sessionStorage.getItem(this.draftKey(session.session, file));
+    const before = this.files.find((f) => f.file === file);
+    this.files = this.files.filter((f) => f !== before);
+    const edited = before && before.text !== before.base ? before.text : null;
+    const draft = edited ?? sessionStorage.getItem(this.draftKey(session.session, file));
     const opened = this.add(file, session.text, draft ?? session.text);
     this.files = [opened, ...this.files.filter((f) => f !== opened && f.text !== f.base)];
     this.show(opened);
@@ -136,6 +139,8 @@ export class ProgramPanel {
 
   private describe(): void {
     const { current } = this;
+    this.none.hidden = current !== null;
+    this.view.dom.hidden = current === null;
     const ofSession = current === null || current.file === this.sessionFile;
     const edited = current !== null && current.text !== current.base;
     this.apply.textContent = ofSession ? "Apply" : "Use";
@@ -170,8 +175,8 @@ export class ProgramPanel {
 
   private openFile(file: string): void {
     this.open.value = "";
-    if (file === NEW || file === SAVE_AS) {
-      this.create(file === NEW ? "" : this.view.state.doc.toString());
+    if (file === SAVE_AS) {
+      this.create(this.view.state.doc.toString());
       return;
     }
     const opened = this.files.find((f) => f.file === file);
@@ -187,7 +192,7 @@ export class ProgramPanel {
 
   /** Makes a file with a text, under a name that the user chooses. */
   private create(text: string): void {
-    const name = prompt("The new program's file", "new.pcad")?.trim();
+    const name = prompt("Save the program as", "new.pcad")?.trim();
     if (!name) return;
     const file = name.endsWith(".pcad") ? name : `${name}.pcad`;
     void this.error.guard(async () => {
@@ -201,32 +206,41 @@ export class ProgramPanel {
   }
 
   private applyText(): void {
-    const { current } = this;
-    if (!current) return;
-    void this.error.guard(async () => {
-      if (current.file !== this.sessionFile) {
-        await this.useProgram(current);
+    void this.error.guard(() => this.commit());
+  }
+
+  /** Makes the session that of the text on screen: what Start runs is what is seen. Fails with
+   * the mistake, which is marked. */
+  async commit(): Promise<void> {
+    const { session } = this.actions.store.now;
+    const own = this.files.find((f) => f.file === this.sessionFile);
+    // A file that is open beside the session's counts only while it is in sight.
+    const isSeen = this.element.checkVisibility({ visibilityProperty: true });
+    const shown = isSeen ? this.current : (own ?? this.current);
+    if (!shown || (shown === own && shown.text === shown.base)) return;
+    try {
+      if (shown !== own || !session) {
+        await this.useProgram(shown);
         return;
       }
-      const text = this.view.state.doc.toString();
-      try {
-        const session = await this.actions.replace(text);
-        if (!session) return;
-        current.base = session.text;
-        this.changed(current, this.view.state.doc.toString());
-      } catch (error) {
-        if (error instanceof Refusal) showDiagnostics(this.view, error.diagnostics);
-        throw error;
-      }
-    });
+      const next = await this.actions.replace(shown.text);
+      if (!next) return;
+      shown.base = next.text;
+      this.changed(shown, shown.text);
+    } catch (error) {
+      const isMarked = error instanceof Refusal && shown === this.current;
+      if (isMarked) showDiagnostics(this.view, error.diagnostics);
+      throw error;
+    }
+    this.error.clear();
   }
 
   /** Opens a session of a file that was only looked at, with the photograph at hand. */
   private async useProgram(opened: OpenFile): Promise<void> {
     if (opened.text !== opened.base) await this.write(opened);
-    const observe = this.actions.store.now.session?.observe ?? [];
+    await this.actions.openProgram(opened.file);
     this.files = this.files.filter((f) => f !== opened);
-    await this.actions.openProgram(opened.file, observe);
+    this.describe();
   }
 
   private save(): void {
@@ -239,7 +253,7 @@ export class ProgramPanel {
   }
 
   /** Where text that is not applied is kept; another start of the program has other sessions. */
-  private draftKey(session: number, file: string): string {
+  private draftKey(session: number | null, file: string): string {
     return `draft ${this.actions.connection.token.slice(0, 8)} ${session} ${file}`;
   }
 
@@ -247,7 +261,7 @@ export class ProgramPanel {
     const { text, file } = opened;
     await this.actions.connection.ask("write", { file, text });
     // The session has its own text: it changes with Apply, not with Save.
-    if (file !== this.sessionFile) opened.base = text;
+    if (file !== this.sessionFile || !this.actions.store.now.session) opened.base = text;
     this.describe();
   }
 }

@@ -24,6 +24,8 @@ export interface Program {
   file: string;
   shipped: boolean;
   about: string | null;
+  /** The photograph that comes with a shipped program. */
+  example?: string | null;
 }
 
 export interface Folder {
@@ -31,6 +33,8 @@ export interface Folder {
   folder: string;
   programs: Program[];
   pictures: string[];
+  /** The photographs that come with pcadlang. */
+  examples: string[];
   runs: Run[];
   evaluations: string[];
   sessions: number[];
@@ -58,6 +62,21 @@ export interface Guess {
   outlines: Point[][][];
 }
 
+/** A `data` item of a program. */
+export interface Data {
+  name: string;
+  kind: string | null;
+  given: boolean;
+}
+
+/** A program that cannot be opened until its data are given. */
+export interface Wanting {
+  session: null;
+  program: string;
+  text: string;
+  data: Data[];
+}
+
 export interface Session {
   session: number;
   program: string;
@@ -66,10 +85,12 @@ export interface Session {
   observe: string[];
   hint: Hint;
   photo: { name: string; width: number; height: number } | null;
-  data: { name: string; kind: string; given: boolean }[];
+  data: Data[];
   params: { name: string; value: unknown; about?: string | null }[];
   revision: number;
   log_joint: number | null;
+  /** The state is a draw from the prior that nobody changed. */
+  is_prior: boolean;
   undo: string | null;
   redo: string | null;
   has_view: boolean;
@@ -237,6 +258,8 @@ export interface Camera {
 export type Event =
   | { event: "run"; run: Run }
   | { event: "session"; session: number; revision: number }
+  | { event: "opened"; session: number; program: string }
+  | { event: "closed"; session: number }
   | { event: "folder" };
 
 /** The layers of pictures, with their names. */
@@ -348,4 +371,9 @@ export function isLive(run: Run): boolean {
 /** True if a run that does not work at present can go on. */
 export function canGoOn(run: Run): boolean {
   return ["paused", "stopped", "interrupted"].includes(run.state);
+}
+
+/** The `data` item that a photograph is for. */
+export function imageItem(data: Data[]): Data | null {
+  return data.find((d) => d.kind === "image") ?? null;
 }

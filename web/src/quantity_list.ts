@@ -75,6 +75,7 @@ export class QuantityList {
       const lower = name.toLowerCase();
       return this.words.every((word) => lower.includes(word));
     });
+    this.element.style.setProperty("--rows", String(this.names.length));
     this.list.update(this.names.length);
   }
 

@@ -1,10 +1,12 @@
 // The middle of the page: the viewer, and which states it shows.
 
 import type { Actions, View } from "./actions";
-import { button, h, Segments, select } from "./dom";
+import { button, fill, h, Segments, select } from "./dom";
 import { ErrorBox } from "./errors";
+import type { Chooser } from "./chooser";
 import { HintLayer } from "./hint_layer";
-import { hasBest } from "./protocol";
+import { hasBest, imageItem } from "./protocol";
+import { StartPanel } from "./start_panel";
 import { StudioData } from "./studio_data";
 import { Viewer } from "./viewer";
 
@@ -38,12 +40,17 @@ export class ScenePanel {
   private readonly viewer: Viewer;
   private readonly error = new ErrorBox();
   private readonly note = h("div", { class: "note-bar", role: "note", hidden: true });
+  private readonly start: StartPanel;
   private readonly exports: HTMLElement;
   private shown = "";
   private key = "";
 
-  constructor(private readonly actions: Actions) {
+  constructor(
+    private readonly actions: Actions,
+    private readonly chooser: Chooser,
+  ) {
     const { store } = actions;
+    this.start = new StartPanel(chooser);
     const choose = (view: string) => store.set({ view: view as View, at: null });
     this.views = new Segments("States", VIEWS, "session", choose);
     for (const child of this.views.element.children) {
@@ -61,9 +68,17 @@ export class ScenePanel {
     this.viewer = new Viewer(this.views.element);
     this.viewer.onFrame = (at) => store.set({ at });
     new HintLayer(actions, this.viewer.pictures);
-    this.element = h("div", { class: "scene" }, this.note, this.viewer.element, this.error.element);
+    this.element = h(
+      "div",
+      { class: "scene" },
+      this.start.element,
+      this.note,
+      this.viewer.element,
+      this.error.element,
+    );
     this.viewer.element.querySelector(".viewer-head")!.append(this.exports);
-    const keys = ["session", "runs", "run", "draws", "modes", "view", "at", "connected"] as const;
+    store.on(["session", "wanting", "run", "photo", "folder"], () => this.showStart());
+    const keys = ["session", "photo", "runs", "run", "draws", "modes", "view", "at", "connected"] as const;
     store.on([...keys], () => this.show());
     store.on(["moved"], () => this.follow());
     this.show();
@@ -89,6 +104,7 @@ export class ScenePanel {
     for (const child of this.exports.children) {
       (child as HTMLButtonElement | HTMLSelectElement).disabled = !hasBest(run);
     }
+    this.showStart();
     this.showNote();
     if (!known.connected) return;
     const data = new StudioData(connection, known);
@@ -114,20 +130,50 @@ export class ScenePanel {
     this.viewer.setData(data, known.at ?? 0);
   }
 
+  /** Without a program or a run there is nothing to view: the first page is in its place. */
+  private showStart(): void {
+    const { session, run } = this.actions.store.now;
+    const isFirst = session === null && run === null;
+    this.start.element.hidden = !isFirst;
+    this.viewer.element.hidden = isFirst;
+    if (isFirst) this.start.show();
+  }
+
   private showNote(): void {
-    const { session, view } = this.actions.store.now;
-    // The session's note from when it was opened; its log joint is shown elsewhere.
-    const lines = (session?.note ?? "").split("\n").filter((line) => !/^log joint/.test(line));
-    const note = view === "session" ? lines.join("\n").trim().replace(/^note: /, "") : "";
-    this.note.textContent = note;
-    this.note.hidden = note === "";
+    const { session, view, photo } = this.actions.store.now;
+    const missing = (session?.data ?? []).filter((d) => !d.given);
+    const notes = view === "session" && session ? this.notes(session.note, missing.length > 0) : [];
+    const image = session && imageItem(session.data);
+    if (session && !image && photo !== null && session.has_view) {
+      notes.push(h("span", {}, `${session.program} takes no photograph: ${photo} is not used.`));
+    }
+    if (notes.length > 0 && image && missing.includes(image)) {
+      const buttons = this.chooser.photoButtons();
+      notes.push(h("span", {}, "It needs a photograph:"), h("div", { class: "buttons" }, ...buttons));
+    } else if (notes.length > 0 && missing.length > 0) {
+      const names = missing.map((d) => d.name).join(", ");
+      notes.push(h("span", {}, `Say in the program where \`${names}\` is: data d = csv("FILE");`));
+    }
+    fill(this.note, ...notes);
+    this.note.hidden = notes.length === 0;
     const none = "This program draws no scene: its choices are under Trace, its draws under Plots.";
     const run = this.actions.store.currentRun;
     const early = run?.state === "failed" ? "The run failed." : "The run has no state yet.";
-    const start = "Open a program and a photograph above, or drop a photograph on the page.";
-    if (session === null && run === null) this.viewer.setEmpty(start);
-    else if (view === "best" && !hasBest(run)) this.viewer.setEmpty(early);
+    if (view === "best" && !hasBest(run)) this.viewer.setEmpty(early);
     else this.viewer.setEmpty(session && !session.has_view ? none : "No picture yet");
+  }
+
+  /** What is to be known of the session's state. */
+  private notes(note: string | null, lacks: boolean): HTMLElement[] {
+    const { session, runs } = this.actions.store.now;
+    // The log joint is shown elsewhere; what is missing is asked for.
+    const isSaid = (line: string) => /^log joint|is not given, so nothing is observed/.test(line);
+    const lines = (note ?? "").split("\n").filter((line) => line.trim() && !isSaid(line));
+    const notes = lines.map((line) => h("span", { class: "warned" }, line.replace(/^note: /, "")));
+    const isFirst = session?.is_prior && !runs.some((r) => r.session === session.session);
+    if (lacks) notes.push(h("b", {}, "A draw from the prior."));
+    else if (isFirst) notes.push(h("b", {}, "A draw from the prior: press Start to fit it."));
+    return notes;
   }
 
   private edit(): void {

@@ -1,33 +1,33 @@
-// The settings of a run: preset, time, chains, seed and parameters of the program.
+// The settings of a run: preset, beside Start; time, chains, seed and parameters of the program.
 
-import { fill, h } from "./dom";
+import { fill, h, setOptions } from "./dom";
 import type { Session, Settings } from "./protocol";
 
 /** The form behind the gear of the top bar. */
 export class SettingsForm {
   readonly element = h("form", { class: "popover", id: "settings", hidden: true });
-  private readonly quality = h("select", { name: "quality" });
-  private readonly about = h("p", { class: "muted" });
+  /** How much is done: it stands beside Start. */
+  readonly quality = h("select", { name: "quality", "aria-label": "Quality" });
   private readonly time = field("time", "as preset");
   private readonly chains = field("chains", "as preset");
+  private next = "fast";
   private readonly seed = field("seed", "as preset");
   private readonly params = h("div", { class: "params" });
-  private presets: Session["presets"] | null = null;
+  private presets: Session["presets"] = [];
+  /** The program and photograph that the choice of a preset was for. */
+  private chosenFor = "";
 
   constructor(private readonly toggle: HTMLElement) {
     const row = (text: string, control: HTMLElement) => {
       return h("label", {}, h("span", {}, text), control);
     };
     this.element.append(
-      row("Quality", this.quality),
-      this.about,
       row("Time, seconds", this.time),
       row("Chains", this.chains),
       row("Seed", this.seed),
       h("details", {}, h("summary", {}, "Parameters of the program"), this.params),
     );
     this.element.addEventListener("submit", (event) => event.preventDefault());
-    this.quality.addEventListener("change", () => this.explain());
     this.element.addEventListener("keydown", (event) => {
       if (event.key === "Escape") this.open(false);
     });
@@ -44,19 +44,19 @@ export class SettingsForm {
   open(shown = this.element.hidden): void {
     this.element.hidden = !shown;
     this.toggle.setAttribute("aria-expanded", String(shown));
-    if (shown) this.quality.focus();
+    if (shown) this.time.focus();
     else this.toggle.focus();
   }
 
   /** Takes the presets and parameters of a session's program. */
   setSession(session: Session | null): void {
     const presets = session?.presets ?? [];
-    if (JSON.stringify(presets) !== JSON.stringify(this.presets)) {
+    const key = JSON.stringify([session?.program, session?.observe, presets]);
+    if (key !== this.chosenFor) {
+      this.chosenFor = key;
       this.presets = presets;
-      const options = presets.map(({ name }) => h("option", { value: name }, name));
-      fill(this.quality, h("option", { value: "" }, "program's own"), ...options);
+      this.quality.value = "";
     }
-    this.explain();
     const old = new Map([...this.fields()].map((f) => [f.name, f.value]));
     fill(
       this.params,
@@ -72,7 +72,10 @@ export class SettingsForm {
   /** The settings as they are filled in; what is empty stays as preset. */
   settings(): Settings {
     const result: Settings = {};
-    if (this.quality.value) result.quality = this.quality.value;
+    const isTimed = this.time.value.trim() !== "";
+    // A time that was filled in selects its own preset.
+    const quality = this.quality.value || (isTimed ? "" : this.next);
+    if (quality && this.presets.length > 0) result.quality = quality;
     for (const input of [this.time, this.chains, this.seed]) {
       const value = Number(input.value);
       if (input.value.trim() === "") continue;
@@ -91,10 +94,20 @@ export class SettingsForm {
     return [...this.params.querySelectorAll("input")];
   }
 
-  private explain(): void {
-    const preset = (this.presets ?? []).find(({ name }) => name === this.quality.value);
-    this.about.textContent = preset?.about ?? "";
-    this.about.hidden = !preset?.about;
+  /** What Start does unless the user chose: `fast`, and once that was tried `accurate`. */
+  setTried(isTried: boolean): void {
+    this.next = isTried ? "accurate" : "fast";
+    const text = (name: string) => {
+      const preset = this.presets.find((p) => p.name === name);
+      return preset ? `${name}, ${preset.about.split(",")[0]}` : name;
+    };
+    const first = isTried ? `now ${text("accurate")}` : `${text("fast")}, then accurate`;
+    const all = this.presets.map(({ name }): [string, string] => [name, text(name)]);
+    const value = this.quality.value;
+    setOptions(this.quality, [["", first], ...all, ["own", "the program's own time"]], value);
+    const about = this.presets.map((p) => `${p.name}: ${p.about}`);
+    this.quality.title = ["How much Start does", ...about].join("\n");
+    this.quality.hidden = this.presets.length === 0;
   }
 }
 

@@ -3,7 +3,7 @@
 import { viridisGradient } from "./colour_map";
 import { Latest } from "./connection";
 import { button, fill, h, number, select } from "./dom";
-import { ErrorBox } from "./errors";
+import { ErrorBox, isWithoutScene } from "./errors";
 import type { Mesh } from "./protocol";
 import { Scene3D } from "./scene3d";
 import type { Paint } from "./scene_geometry";
@@ -262,6 +262,7 @@ export class SpaceView {
   }
 
   private fail(error: unknown): void {
-    this.error.show(error);
+    if (isWithoutScene(error)) this.scene?.clear();
+    else this.error.show(error);
   }
 }

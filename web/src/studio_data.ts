@@ -19,7 +19,8 @@ export function statesOf(known: Readonly<Known>): [Frame, State][] {
   };
   if (view === "session") {
     if (!session) return [];
-    return [[plain("The session's state", session.log_joint), { session: session.session }]];
+    const label = session.is_prior ? "A draw from the prior" : "The session's state";
+    return [[plain(label, session.log_joint), { session: session.session }]];
   }
   if (run === null) return [];
   if (view === "film") {
@@ -67,8 +68,8 @@ export class StudioData implements ViewerData {
     const shown = session && ofSession && !session.has_view ? [] : statesOf(known);
     this.frames = shown.map(([frame]) => frame);
     this.states = shown.map(([, state]) => state);
-    // Another photograph changes the pictures of a session's states, whatever its number.
-    const data = view === "session" ? JSON.stringify(session?.observe) : "";
+    // Another photograph changes the pictures of a session's states, another run its ghosts.
+    const data = view === "session" ? JSON.stringify([session?.observe, run]) : "";
     this.key = `${view} ${view === "session" ? session?.session : run} ${data}`;
     this.drawCount = run === null ? 0 : (draws?.draws.length ?? 0);
     this.run = run;

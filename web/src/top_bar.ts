@@ -1,13 +1,18 @@
 // The bar at the top: what is open, and the controls of the run.
 
 import type { Actions } from "./actions";
+import { Chooser } from "./chooser";
+import { Refusal } from "./connection";
 import { button, duration, fill, h, number, select, setOptions } from "./dom";
 import { ErrorBox } from "./errors";
 import { helpButton } from "./help";
 import { canGoOn, isLive, runName, type Run } from "./protocol";
 import { SettingsForm } from "./settings";
 
+// Not names of files: these have an ending.
 const OTHER = "…";
+const NEW = "new";
+const EXAMPLE = "example ";
 
 /** The program, its photograph, and Start, Pause, Go on, Stop. */
 export class TopBar {
@@ -16,6 +21,9 @@ export class TopBar {
   /** Why the run that is looked at failed. */
   readonly runError = new ErrorBox();
   private failed = "";
+  readonly chooser: Chooser;
+  /** Applies what is in the editor before a run. */
+  onStart: () => Promise<void> = async () => {};
   private readonly program = select([], "", (file) => this.openProgram(file), {
     "aria-label": "Program",
     class: "strong",
@@ -23,7 +31,6 @@ export class TopBar {
   private readonly photo = select([], "", (file) => this.openPhoto(file), {
     "aria-label": "Photograph",
   });
-  private readonly upload = h("input", { type: "file", accept: "image/png,image/jpeg" });
   private readonly start = button("Start", () => this.begin(), { class: "primary" });
   private readonly pause = button("Pause", () => this.steer("pause"));
   private readonly goOn = button("Go on", () => this.steer("go_on"));
@@ -31,27 +38,21 @@ export class TopBar {
   private readonly gear = button("Settings", () => this.settings.open());
   private readonly settings = new SettingsForm(this.gear);
   private readonly status = h("div", { class: "status" });
-  private readonly found = h("p", { class: "found", hidden: true });
+  private readonly found = h("div", { class: "found", role: "status", hidden: true });
   private readonly bar = h("progress", { max: 1, "aria-label": "Progress of the phase" });
 
   constructor(private readonly actions: Actions) {
     const { store } = actions;
-    this.upload.hidden = true;
-    this.upload.addEventListener("change", () => {
-      const file = this.upload.files?.[0];
-      if (file) void this.error.guard(() => this.take(file));
-      this.upload.value = "";
-    });
+    this.chooser = new Chooser(actions, this.error);
     this.start.title = "Start inference (Alt-R)";
     const wrap = h("div", { class: "settings-wrap" }, this.gear, this.settings.element);
     this.element = h(
       "header",
       { class: "top-bar" },
       h("span", { class: "brand" }, "pcadlang"),
-      h("div", { class: "group" }, this.program, this.photo, this.upload),
-      h("div", { class: "group" }, this.start, this.pause, this.goOn, this.stop, wrap),
+      h("div", { class: "group" }, this.program, this.photo, this.chooser.element),
+      h("div", { class: "group" }, this.start, this.settings.quality, this.pause, this.goOn, this.stop, wrap, helpButton()),
       h("div", { class: "progress" }, this.status, this.bar),
-      helpButton(),
       this.found,
     );
     document.addEventListener("keydown", (event) => {
@@ -60,22 +61,17 @@ export class TopBar {
         this.begin();
       }
     });
-    store.on(["session", "folder"], () => this.showSession());
-    store.on(["runs", "run"], () => this.showRun());
+    store.on(["session", "wanting", "photo", "folder"], () => this.showSession());
+    store.on(["runs", "run", "session", "warnings"], () => this.showRun());
     this.showSession();
     this.showRun();
   }
 
-  /** Stores a photograph that was chosen or dropped, and observes it. */
-  async take(file: File): Promise<void> {
-    if (!/^image\/(png|jpeg)$/.test(file.type)) {
-      throw new Error(`${file.name} is no PNG or JPEG picture`);
-    }
-    await this.actions.observePicture(await this.actions.connection.upload(file));
-  }
-
   private begin(): void {
-    void this.error.guard(async () => this.actions.run(this.settings.settings()));
+    void this.error.guard(async () => {
+      await this.onStart();
+      await this.actions.run(this.settings.settings());
+    });
   }
 
   private steer(method: "pause" | "go_on" | "stop"): void {
@@ -84,46 +80,57 @@ export class TopBar {
   }
 
   private openProgram(file: string): void {
-    const session = this.actions.store.now.session;
-    // The photograph is kept where the new program can take one.
-    const observe = session?.photo ? session.observe.filter((o) => !o.includes("=")) : [];
-    void this.error.guard(() =>
-      this.actions.openProgram(file, observe).catch((error) => {
-        if (observe.length === 0) throw error;
-        return this.actions.openProgram(file);
-      }),
-    );
+    if (file === OTHER) this.chooser.programFile();
+    else if (file === NEW) this.chooser.newProgram();
+    else if (file) this.chooser.program(file);
     this.showSession();
   }
 
   private openPhoto(file: string): void {
-    if (file === OTHER) this.upload.click();
-    else if (file) void this.error.guard(() => this.actions.observePicture(file));
+    if (file === OTHER) this.chooser.pictureFile();
+    else if (file.startsWith(EXAMPLE)) this.chooser.example(file.slice(EXAMPLE.length));
+    else this.chooser.photo(file === "" ? null : file);
     this.showSession();
   }
 
   private showSession(): void {
-    const { session, folder } = this.actions.store.now;
+    const { session, wanting, folder, photo } = this.actions.store.now;
     const files = (folder?.programs ?? []).map(({ file, shipped }): [string, string] => {
       return [file, shipped ? `${file} (shipped)` : file];
     });
-    const current = session?.program ?? "";
-    if (!files.some(([file]) => file === current)) files.unshift([current, current || "Program"]);
-    setOptions(this.program, files, current);
-    const photo = session?.photo?.name ?? "";
-    const given = session?.observe.find((o) => !o.includes("=")) ?? photo;
+    const current = session?.program ?? wanting?.program ?? "";
+    if (!files.some(([file]) => file === current)) {
+      files.unshift([current, current || "Choose a program"]);
+    }
+    const more: [string, string][] = [[NEW, "New program"], [OTHER, "A program's file …"]];
+    setOptions(this.program, [...files, ...more], current);
     const pictures = [...(folder?.pictures ?? [])];
-    if (given && !pictures.includes(given)) pictures.unshift(given);
+    if (photo !== null && !pictures.includes(photo)) pictures.unshift(photo);
     const options = pictures.map((p): [string, string] => [p, p]);
-    if (!given) options.unshift(["", "No photograph"]);
-    setOptions(this.photo, [...options, [OTHER, "Another file …"]], given);
+    const examples = this.chooser.examples().filter((e) => !pictures.includes(`pictures/${e}`));
+    setOptions(
+      this.photo,
+      [
+        ["", "No photograph"],
+        ...options,
+        ...examples.map((e): [string, string] => [`${EXAMPLE}${e}`, `Example: ${e}`]),
+        [OTHER, "Another file …"],
+      ],
+      photo ?? "",
+    );
     this.settings.setSession(session);
-    this.start.disabled = session === null;
     document.title = session ? `${session.program} – pcadlang studio` : "pcadlang studio";
   }
 
   private showRun(): void {
+    const { session, runs, warnings } = this.actions.store.now;
     const run = this.actions.store.currentRun;
+    const observe = JSON.stringify(session?.observe);
+    const isOfSession = (r: Run) => {
+      return r.session === session?.session && JSON.stringify(r.observe) === observe;
+    };
+    const tried = runs.filter(isOfSession);
+    this.settings.setTried(tried.length > 0);
     this.pause.hidden = run?.state !== "running" && run?.state !== "waiting";
     this.goOn.hidden = !run || !canGoOn(run);
     this.stop.hidden = !run || !isLive(run);
@@ -132,14 +139,42 @@ export class TopBar {
     if (run && run.done !== null && run.done !== undefined) this.bar.value = run.done;
     else this.bar.removeAttribute("value");
     fill(this.status, ...(run ? statusOf(run) : ["No run yet"]));
-    this.found.textContent = run?.found ?? "";
-    this.found.hidden = !run?.found;
+    fill(
+      this.found,
+      run?.found ? verdict(run.found, tried.length === 1 && tried[0] === run) : null,
+      warnings.length > 0 ? warningList(warnings) : null,
+    );
+    this.found.hidden = this.found.childElementCount === 0;
     const failed = run?.error ? `${run.run} ${run.error}` : "";
     if (failed === this.failed) return;
     this.failed = failed;
-    if (run?.error) this.runError.show(new Error(run.error));
+    if (run?.error) this.runError.show(failure(run.error));
     else this.runError.clear();
   }
+}
+
+/** Whether the object was found; of options of the command line the page has its own. */
+function verdict(found: string, isFirst: boolean): HTMLElement {
+  const text = found.replace(/ \([^()]*--[^()]*\)/g, "");
+  const isFound = /^found/i.test(text);
+  const kind = isFound ? "is-found" : /^perhaps/i.test(text) ? "perhaps" : "not-found";
+  const more = isFirst ? "Start again for more time, or point" : "Point";
+  const help = isFound ? "" : `. ${more} it out with the tools over the photograph.`;
+  return h("p", { class: kind }, text.replace(/\.$/, help ? "" : "."), help);
+}
+
+/** Why a run failed; a time that is too short is no fault of the program. */
+function failure(error: string): Error {
+  if (!/stopped in the middle of an evaluation/.test(error)) return new Error(error);
+  const hint = "Start again with the preset `accurate`, or give it a time under Settings";
+  return new Refusal("The run ended before it had a first state: it needs more time", hint);
+}
+
+/** The warnings of a run; they unfold. */
+function warningList(warnings: string[]): HTMLElement {
+  const title = warnings.length === 1 ? "1 warning" : `${warnings.length} warnings`;
+  const items = warnings.map((text) => h("li", {}, text));
+  return h("details", { class: "warnings" }, h("summary", {}, title), h("ul", {}, ...items));
 }
 
 /** The state of a run in one line. */

@@ -223,7 +223,7 @@ fn is_name(text: &str) -> bool {
 
 /// Returns the name and path of `NAME=FILE`; the name may be omitted if only one item
 /// fits.
-fn named(program: &Program, spec: &str) -> Result<(String, String), Failure> {
+pub fn named(program: &Program, spec: &str) -> Result<(String, String), Failure> {
     if let Some((name, path)) = spec.split_once('=')
         && is_name(name)
     {

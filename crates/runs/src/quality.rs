@@ -62,7 +62,7 @@ pub fn apply(job: &mut Job, keypoints: bool) -> Result<Option<String>, Failure> 
 }
 
 /// Returns whether a run has the data that the presets were measured with.
-fn fits(presets: &Presets, keypoints: bool) -> bool {
+pub fn fits(presets: &Presets, keypoints: bool) -> bool {
     presets.needs.iter().all(|kind| kind == "keypoints" && keypoints)
 }
 

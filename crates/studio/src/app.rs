@@ -1,6 +1,7 @@
 //! Does what the page asks: every method of the protocol, by the sessions of the prompt and
 //! the runs of `pcadlang run`.
 
+use super::examples;
 use super::folder::Folder;
 use super::guess;
 use super::protocol::HintJson;
@@ -8,7 +9,7 @@ use super::protocol::{self, Call, StateName, Viewpoint};
 use super::results::{self, finite};
 use super::runs::Runs;
 use super::server::Answer;
-use super::sessions::{OpenSession, Sessions, job_of};
+use super::sessions::{OpenSession, Sessions, job_of, suited, without_data};
 use pcadlang_engine::lang::builtins::data::from_json;
 use pcadlang_engine::lang::value::Located;
 use pcadlang_engine::trace::{Stop, Trace};
@@ -57,15 +58,24 @@ impl App {
                 self.tell(json!({ "event": "folder" }));
                 json!({})
             }
+            Call::Example(e) => {
+                let bytes = examples::bytes(&e.picture)?;
+                let file = self.folder.store_picture(&e.picture, bytes)?;
+                self.tell(json!({ "event": "folder" }));
+                json!({ "file": file })
+            }
             Call::Evaluation(e) => self.folder.evaluation(&e.folder)?,
             Call::Open(o) => self.open(&o)?,
             Call::Describe(s) => self.session(s.session)?,
             Call::Close(c) => {
                 self.sessions.close(c.session)?;
+                self.tell(json!({ "event": "closed", "session": c.session }));
                 json!({})
             }
             Call::Replace(r) => {
-                self.change(r.session, move |open| open.session.replace(&r.text).map(|_| ()))?
+                self.permit(r.photo.as_slice())?;
+                let photo = r.photo;
+                self.change(r.session, move |open| open.replace(&r.text, photo, Stop::default()))?
             }
             Call::Observe(o) => {
                 self.permit(&o.observe)?;
@@ -181,7 +191,14 @@ impl App {
             (Some(program), None) => {
                 self.folder.file(program)?;
                 self.permit(&o.observe)?;
-                self.sessions.open(job_of(program, &o.set, &o.observe), None)?
+                self.permit(o.photo.as_slice())?;
+                let mut job = job_of(program, &o.set, &o.observe);
+                let read = inputs::program(&job.inputs, true)?;
+                job.observe.extend(suited(&read, &[], o.photo.as_deref()));
+                match self.sessions.open(job.clone(), None) {
+                    Ok(handle) => handle,
+                    Err(failure) => return without_data(read, &job, failure),
+                }
             }
             (None, Some(run)) => {
                 let run = Reopened::open(&self.runs.get(run)?.folder)?;
@@ -190,7 +207,9 @@ impl App {
             _ => return Err(plain("`open` needs either a program or a run")),
         };
         let id = handle.id;
-        handle.ask(move |open| Ok(open.described(id)))
+        let said = handle.ask(move |open| Ok(open.described(id)))?;
+        self.tell(json!({ "event": "opened", "session": id, "program": said["program"] }));
+        Ok(said)
     }
 
     fn session(&self, id: u64) -> Result<Value, Failure> {
@@ -299,6 +318,7 @@ impl App {
     fn begin(&self, b: protocol::Begin) -> Result<Value, Failure> {
         let folder = self.folder.path().to_owned();
         let job = self.sessions.get(b.session)?.ask(move |open| {
+            open.check_data()?;
             open.write_program(&folder)?;
             Ok(open.job.clone())
         })?;

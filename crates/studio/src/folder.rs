@@ -1,5 +1,6 @@
 //! The files of the opened folder: programs, pictures, evaluations.
 
+use super::examples;
 use super::results::finite;
 use pcadlang_engine::lang::reach::path_within;
 use pcadlang_library::shipped;
@@ -75,7 +76,7 @@ impl Folder {
         let known = shipped::programs()
             .filter(runnable)
             .filter(|f| !all.iter().any(|own| own == f))
-            .map(|f| json!({ "file": f, "shipped": true, "about": first_comment(shipped::file(f).unwrap_or_default()) }));
+            .map(|f| json!({ "file": f, "shipped": true, "example": examples::of_program(f), "about": first_comment(shipped::file(f).unwrap_or_default()) }));
         let programs: Vec<Value> = own.chain(known).take(LISTED).collect();
         let pictures: Vec<&String> = all.iter().filter(|f| is_picture(f)).take(LISTED).collect();
         let evaluations: Vec<String> = all
@@ -83,7 +84,11 @@ impl Folder {
             .filter_map(|f| Some(f.strip_suffix(MARK)?.trim_end_matches('/').to_owned()))
             .filter(|f| !f.is_empty())
             .collect();
-        json!({ "programs": programs, "pictures": pictures, "evaluations": evaluations })
+        let examples: Vec<&str> = examples::names().collect();
+        json!({
+            "programs": programs, "pictures": pictures, "examples": examples,
+            "evaluations": evaluations,
+        })
     }
 
     fn about(&self, file: &str) -> String {

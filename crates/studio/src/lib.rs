@@ -7,8 +7,10 @@
 #[macro_use]
 extern crate pcadlang_runs;
 
+mod advice;
 mod app;
 mod args;
+mod examples;
 mod folder;
 mod guard;
 mod guess;

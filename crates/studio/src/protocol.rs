@@ -113,6 +113,8 @@ methods! {
     Read = "read" { file: String }
     /// Writes a program.
     Write = "write" { file: String, text: String }
+    /// Stores a photograph that comes with the program.
+    Example = "example" { picture: String }
     /// The cases of an evaluation.
     Evaluation = "evaluation" { folder: String }
 
@@ -120,6 +122,8 @@ methods! {
     Open = "open" {
         program: Option<String>,
         run: Option<String>,
+        /// The photograph at hand, which is observed if the program takes one.
+        photo: Option<String>,
         #[serde(default)] observe: Vec<String>,
         #[serde(default)] set: BTreeMap<String, String>,
     }
@@ -128,7 +132,12 @@ methods! {
     /// Closes a session.
     Close = "close" { session: u64 }
     /// Replaces the text of a session's program.
-    Replace = "replace" { session: u64, text: String }
+    Replace = "replace" {
+        session: u64,
+        text: String,
+        /// The photograph at hand, which is observed if the new text takes one.
+        photo: Option<String>,
+    }
     /// Opens a session again with other data.
     Observe = "observe" { session: u64, observe: Vec<String> }
     /// Says where the object is in a session's photograph.

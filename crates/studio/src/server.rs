@@ -1,6 +1,7 @@
 //! The web server: the page, its sockets with requests, answers and events, photographs that
 //! are sent, files of the opened folder.
 
+use super::advice::on_page;
 use super::app::App;
 use super::guard::{Guard, Refusal};
 use super::language;
@@ -358,12 +359,12 @@ fn refusal(id: u64, failure: &Failure) -> String {
         protocol::error(Some(id), message, hint, diagnostics)
     };
     match failure {
-        Failure::Plain(message, hint) => error(message, hint.as_deref(), json!([])),
+        Failure::Plain(message, hint) => error(message, hint.as_deref().map(on_page), json!([])),
         Failure::Interrupted => error(STOPPED, None, json!([])),
         Failure::Program(e) => {
             let first = e.diagnostics.first();
             let message = first.map_or("", |d| &d.message);
-            let hint = first.and_then(|d| d.hints.first()).map(String::as_str);
+            let hint = first.and_then(|d| d.hints.first()).map(|h| on_page(h));
             let all: Vec<Value> = e.diagnostics.iter().map(|d| place(d, &e.sources)).collect();
             error(message, hint, json!(all))
         }
@@ -389,7 +390,7 @@ fn place(d: &Diagnostic, sources: &SourceMap) -> Value {
         Severity::Warning => "warning",
         Severity::Note => "note",
     };
-    let mut out = json!({ "severity": severity, "message": said, "hint": d.hints.first() });
+    let mut out = json!({ "severity": severity, "message": said, "hint": d.hints.first().map(|h| on_page(h)) });
     if let Some((label, file)) = label.and_then(|l| Some((l, sources.get(l.span.file)?))) {
         let range = Encoding::Utf16.range(file, label.span);
         out["file"] = json!(file.name());

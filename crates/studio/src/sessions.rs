@@ -59,8 +59,8 @@ pub struct OpenSession {
     pub job: Job,
     /// The message at its opening.
     pub note: String,
-    /// The names of its data that are not given.
-    missing: Vec<String>,
+    /// The revision at which its state was drawn from the prior; none at a state of a run.
+    drawn: Option<u64>,
 }
 
 /// Makes the job of a program that observes some files.
@@ -184,16 +184,15 @@ impl OpenSession {
     fn of_run(run: &Reopened, seed: u64, stop: Stop) -> Result<Self, Failure> {
         let (mut session, said) = run.session(seed, stop)?;
         session.confine(Path::new("."));
-        let missing = session.program().missing_data();
-        Ok(OpenSession { session, job: run.job.clone(), note: said.text, missing })
+        Ok(OpenSession { session, job: run.job.clone(), note: said.text, drawn: None })
     }
 
     fn of(program: Program, job: Job, stop: Stop) -> Result<Self, Failure> {
         let (program, _) = inputs::observe(program, &job)?;
-        let missing = program.missing_data();
         let (mut session, said) = Session::open(program, job.sampling.seed, stop)?;
         session.confine(Path::new("."));
-        Ok(OpenSession { session, job, note: said.text, missing })
+        let drawn = Some(session.revision());
+        Ok(OpenSession { session, job, note: said.text, drawn })
     }
 
     /// Shows the image that it observes.
@@ -205,15 +204,62 @@ impl OpenSession {
     /// Gives the program other data, without a hint, which was about the old photograph.
     /// `:undo` goes back to the program with the old data.
     pub fn observe(&mut self, observe: Vec<String>, stop: Stop) -> Result<(), Failure> {
+        let text = self.session.text().to_owned();
+        self.renew(observe, &text, "other data", stop)
+    }
+
+    /// Replaces the text of its program: shared choices keep their values, unless the new
+    /// text takes other data. It observes `photo` if it takes one. `:undo` goes back.
+    pub fn replace(
+        &mut self,
+        text: &str,
+        photo: Option<String>,
+        stop: Stop,
+    ) -> Result<(), Failure> {
+        let (before, after) = (self.session.program(), self.session.program().edited(text)?);
+        let observe = suited(&after, &self.job.observe, photo.as_deref());
+        let needs = |p: &Program| p.missing_data().is_empty();
+        match observe == self.job.observe && needs(before) == needs(&after) {
+            true => self.session.replace(text).map(|_| ()),
+            false => self.renew(observe, text, ":edit", stop),
+        }
+    }
+
+    /// Opens it again with other data and a text.
+    fn renew(
+        &mut self,
+        observe: Vec<String>,
+        text: &str,
+        what: &str,
+        stop: Stop,
+    ) -> Result<(), Failure> {
         let mut job = Job { observe, ..self.job.clone() };
         job.inputs.hint = HintArgs::default();
-        let program = inputs::program(&job.inputs, true)?;
-        let program = match program.text() == self.session.text() {
-            true => program,
-            false => program.edited(self.session.text())?,
+        let read = inputs::program(&job.inputs, true)?;
+        let program = match read.text() == text {
+            true => read,
+            false => read.edited(text)?,
         };
-        self.take_over(OpenSession::of(program, job, stop)?, "other data");
+        let opened = OpenSession::of(program.clone(), job.clone(), stop);
+        let opened = opened.map_err(|failure| match needed(program, &job, &failure) {
+            Some(_) => plain(format!("{} cannot do without its photograph", job.inputs.program))
+                .hint("choose another photograph, or the example, at the top of the page"),
+            None => failure,
+        })?;
+        self.take_over(opened, what);
         Ok(())
+    }
+
+    /// Checks that a run has what it needs.
+    pub fn check_data(&self) -> Result<(), Failure> {
+        match &self.session.program().missing_data()[..] {
+            [] => Ok(()),
+            names => {
+                let (program, names) = (&self.job.inputs.program, names.join("`, `"));
+                let problem = plain(format!("{program} has nothing to fit: `{names}` is missing"));
+                Err(problem.hint("choose a photograph, or the example, at the top of the page"))
+            }
+        }
     }
 
     /// Says where the object is in the photograph, in which nothing is detected anew.
@@ -226,6 +272,7 @@ impl OpenSession {
         self.session.take_over(session, "another hint");
         self.job.inputs.hint = hint;
         self.note = said.text;
+        self.drawn = Some(self.session.revision());
         Ok(())
     }
 
@@ -238,7 +285,9 @@ impl OpenSession {
 
     fn take_over(&mut self, other: OpenSession, what: &str) {
         self.session.take_over(other.session, what);
-        (self.job, self.note, self.missing) = (other.job, other.note, other.missing);
+        let is_drawn = other.drawn.is_some();
+        (self.job, self.note) = (other.job, other.note);
+        self.drawn = is_drawn.then(|| self.session.revision());
     }
 
     /// Writes the program to its file if it was changed, so that a run can read it. An
@@ -263,12 +312,7 @@ impl OpenSession {
             .as_ref()
             .and_then(|i| i.downcast::<ImageValue>()?.as_photo().map(|p| (p.width(), p.height())));
         let name = self.job.observe.iter().map(|o| inputs::file_of(o)).find(|f| is_picture(f));
-        let given = |d: &str| !self.missing.iter().any(|m| m == d);
-        let data: Vec<Value> = interface
-            .data
-            .iter()
-            .map(|d| json!({ "name": d.name, "kind": d.ty, "given": given(&d.name) }))
-            .collect();
+        let data = data_of(s.program());
         let set = |name: &str| self.job.inputs.sets.iter().find(|(n, _)| n == name).map(|(_, v)| v);
         let params: Vec<Value> = interface
             .params
@@ -288,6 +332,7 @@ impl OpenSession {
             "params": params,
             "revision": s.revision(),
             "log_joint": finite(s.trace().log_joint()),
+            "is_prior": self.drawn == Some(s.revision()),
             "undo": undo,
             "redo": redo,
             "has_view": view.is_some(),
@@ -298,12 +343,64 @@ impl OpenSession {
     }
 }
 
+/// Describes the data of a program: which of them are given.
+fn data_of(program: &Program) -> Vec<Value> {
+    let missing = program.missing_data();
+    let data = program.interface().data;
+    data.iter()
+        .map(|d| json!({ "name": d.name, "kind": d.ty, "given": !missing.contains(&d.name) }))
+        .collect()
+}
+
+/// Returns the observations of which a program has the items, with a photograph for its
+/// first image if that has none or another one.
+pub fn suited(program: &Program, observe: &[String], photo: Option<&str>) -> Vec<String> {
+    let data = program.interface().data;
+    let image = data.iter().find(|d| d.ty.as_deref() == Some("image"));
+    let image = image.zip(photo).map(|(d, photo)| (d.name.as_str(), photo));
+    let of = |spec: &String| inputs::named(program, spec).ok();
+    let is_kept = |spec: &&String| {
+        of(spec).is_some_and(|(name, _)| {
+            data.iter().any(|d| d.name == name) && image.is_none_or(|(i, _)| i != name)
+        })
+    };
+    let kept = observe.iter().filter(is_kept).cloned();
+    match image {
+        // The same observation may have been written without a name.
+        Some((name, photo)) => {
+            let old =
+                observe.iter().find(|s| of(s).is_some_and(|o| o == (name.into(), photo.into())));
+            let photo = old.cloned().unwrap_or_else(|| format!("{name}={photo}"));
+            std::iter::once(photo).chain(kept).collect()
+        }
+        None => kept.collect(),
+    }
+}
+
+/// Returns a program with its data, if some are missing and that is why it failed.
+fn needed(program: Program, job: &Job, failure: &Failure) -> Option<Program> {
+    let (program, _) = inputs::observe(program, job).ok()?;
+    // A program that is evaluated without its data finds `nothing` in their place.
+    let is_why = !program.missing_data().is_empty() && failure.to_string().contains("nothing");
+    is_why.then_some(program)
+}
+
+/// Describes a program that has failed to open: as one that needs data if that is why.
+pub fn without_data(program: Program, job: &Job, failure: Failure) -> Result<Value, Failure> {
+    let Some(program) = needed(program, job, &failure) else { return Err(failure) };
+    let (name, text) = (&job.inputs.program, program.text());
+    Ok(json!({ "session": null, "program": name, "text": text, "data": data_of(&program) }))
+}
+
 /// Lists the presets that a run of a job can use.
 fn presets(job: &Job) -> Vec<Value> {
     let Ok(Some((_, presets))) = quality::presets(&job.inputs.program) else { return Vec::new() };
+    if !quality::fits(&presets, job.keypoints.is_some()) {
+        return Vec::new();
+    }
     let of = |q: Quality| {
         let preset = presets.of_quality(q)?.preset;
-        let about = format!("{:.0} s, error {} ({})", preset.seconds, preset.error, presets.error);
+        let about = format!("{} s, error {} ({})", preset.seconds, preset.error, presets.error);
         Some(json!({ "name": q.name(), "about": about }))
     };
     Quality::ALL.into_iter().filter_map(of).collect()

@@ -1,6 +1,7 @@
 //! `pcadlang studio`, used over its protocol as the page uses it.
 
 mod client;
+mod first;
 mod guesses;
 mod refused;
 mod runs;

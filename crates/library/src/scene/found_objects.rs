@@ -15,14 +15,11 @@ const LEAST: f64 = 0.01;
 /// the time: the larger an object is in the picture, the smaller the view that shows it as the
 /// network knows its kind (docs/measurements/objects.md).
 pub(super) const VIEWS: [View; 6] = {
-    const PARTS: [f64; 3] = [1.0, 0.67, 0.55];
-    let mut all = [View::WHOLE; 6];
-    let mut i = 0;
-    while i < 6 {
-        all[i] = View { part: PARTS[i / 2], mirrored: i % 2 == 1 };
-        i += 1;
+    const fn seen(part: f64) -> [View; 2] {
+        [View { part, mirrored: false }, View { part, mirrored: true }]
     }
-    all
+    let ([a, b], [c, d], [e, f]) = (seen(1.0), seen(0.67), seen(0.55));
+    [a, b, c, d, e, f]
 };
 
 /// The key of the objects prepared from views of a photograph.

@@ -204,28 +204,28 @@ pub(super) fn places(
         let axes = of_mirrors(from_mask(photo, &mask));
         return Ok(vec![Place { axes, ..Place::outlined("drawn", 1.0, None, vec![mask]) }]);
     }
-    let found_regions = || image.regions(photo, options);
+    let search = || image.regions(photo, options);
     let size = [photo.width(), photo.height()].map(f64::from);
     if hint.axis.is_some() || hint.bounds.is_some() {
         let source = if hint.axis.is_some() { "axis" } else { "box" };
         let all = image.guesses(photo, hint)?;
         let place = Place::guessed(source, 1.0, hint.bounds, &all);
-        let seen = if hint.bounds.is_some() { found_regions()? } else { Arc::default() };
-        return Ok(vec![place.with_regions(&seen, size)]);
+        let filling = if hint.bounds.is_some() { search()? } else { Arc::default() };
+        return Ok(vec![place.with_regions(&filling, size)]);
     }
     let boxes = boxes(photo, &found(image, &VIEWS)?, hint);
-    let seen_regions = found_regions()?;
+    let candidates = search()?;
     let seen = boxes.iter().map(|(o, weight)| {
         let bounds = Some(sized(o.bounds));
         let all = image.guesses(photo, &Hint { bounds, ..hint.clone() })?;
-        Ok(Place::guessed(o.class, *weight, bounds, &all).with_regions(&seen_regions, size))
+        Ok(Place::guessed(o.class, *weight, bounds, &all).with_regions(&candidates, size))
     });
     let mut all: Vec<Place> = seen.collect::<Result<_, Fault>>()?;
     if !hint.at.is_empty() && !all.is_empty() {
         normalise(&mut all);
         return Ok(all);
     }
-    all.extend(regions(&meant(seen_regions.to_vec(), photo, hint)));
+    all.extend(regions(&meant(candidates.to_vec(), photo, hint)));
     normalise(&mut all);
     Ok(all)
 }

@@ -3,7 +3,7 @@
 use super::Analysis;
 use super::names::BindingKind;
 use super::words::{self, KINDS};
-use pcadlang_engine::lang::builtins::Kind;
+use pcadlang_engine::lang::builtins::{Kind, Type};
 use pcadlang_syntax::{Class, STATEMENTS, classes};
 use std::path::Path;
 
@@ -73,9 +73,14 @@ impl Analysis {
             return (byte, Vec::new());
         }
         let start = words::start_of(before, |c| c.is_alphanumeric() || "_.".contains(c));
+        let is_drawn = before[..start].trim_end().ends_with('~');
         let all = self.arguments(before, start).into_iter();
-        let all = all.chain(self.bound(byte as u32)).chain(self.builtins());
-        chosen(start, before, all.chain(keywords()))
+        let all = all.chain(self.bound(byte as u32)).chain(self.builtins(is_drawn));
+        let (start, mut found) = chosen(start, before, all.chain(keywords()));
+        if is_drawn {
+            found.sort_by_key(|c| c.kind != CandidateKind::Function);
+        }
+        (start, found)
     }
 
     /// The names of the program that can be used here.
@@ -101,9 +106,12 @@ impl Analysis {
         all
     }
 
-    fn builtins(&self) -> impl Iterator<Item = Candidate> {
+    /// The built-in names: after `~` only those of distributions.
+    fn builtins(&self, is_drawn: bool) -> impl Iterator<Item = Candidate> {
         let named = |name: &str| name.starts_with(|c: char| c.is_ascii_alphabetic());
-        let functions = self.builtins.iter().filter(move |b| named(&b.name)).map(|b| Candidate {
+        let fits = move |returns: &Type| !is_drawn || *returns == Type::Dist;
+        let functions = self.builtins.iter().filter(move |b| named(&b.name) && fits(&b.returns));
+        let functions = functions.map(|b| Candidate {
             word: b.full_name(),
             kind: match b.kind {
                 Kind::Plan(_) => CandidateKind::Kernel,
@@ -111,7 +119,8 @@ impl Analysis {
             },
             detail: b.doc.to_string(),
         });
-        let constants = self.builtins.constants().iter().map(|c| Candidate {
+        let constants = self.builtins.constants().iter().filter(move |_| !is_drawn);
+        let constants = constants.map(|c| Candidate {
             word: c.name.to_string(),
             kind: CandidateKind::Constant,
             detail: c.doc.to_string(),

@@ -86,7 +86,8 @@ fn completion(documents: &mut Documents, p: CompletionParams) -> Answer<Vec<Comp
     let byte = encoding.byte(file, at.position);
     let (start, found) = analysis.complete(byte as usize, &folder);
     let range = encoding.range(file, Span::new(FileId(0), start, byte as usize));
-    let item = |c: Candidate| CompletionItem {
+    let item = |(i, c): (usize, Candidate)| CompletionItem {
+        sort_text: Some(format!("{i:05}")),
         kind: Some(item_kind(c.kind)),
         detail: Some(c.detail).filter(|d| !d.is_empty()),
         text_edit: Some(CompletionTextEdit::Edit(TextEdit { range, new_text: c.word.clone() })),
@@ -94,7 +95,7 @@ fn completion(documents: &mut Documents, p: CompletionParams) -> Answer<Vec<Comp
         label: c.word,
         ..CompletionItem::default()
     };
-    Ok(found.into_iter().map(item).collect())
+    Ok(found.into_iter().enumerate().map(item).collect())
 }
 
 fn item_kind(kind: CandidateKind) -> CompletionItemKind {
