@@ -123,7 +123,7 @@ fn shipped_programs_of_pictures() {
         ("lathe.pcad", "photo", "coffee_cup.png"),
         ("table.pcad", "photo", "coffee_cup.png"),
         ("human.pcad", "photo", "skier.jpg"),
-        ("two_people.pcad", "photo", "skier.jpg"),
+        ("people.pcad", "photo", "skier.jpg"),
     ] {
         let path = format!("{}/examples/images/{file}", env!("CARGO_MANIFEST_DIR"));
         let program =

@@ -110,8 +110,8 @@ fn shipped_human_with_handles() {
 }
 
 #[test]
-fn shipped_two_people() {
-    same_of_picture("two_people.pcad", Some(48), &[SKIER], 40, 40);
+fn shipped_people() {
+    same_of_picture("people.pcad", Some(48), &[SKIER], 40, 40);
 }
 
 /// A branch with its own choices, on which one computation stops depending when the

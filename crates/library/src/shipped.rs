@@ -16,7 +16,7 @@ static FILES: Shipped = &[
     ("human.settings.json", include_str!("../../../programs/human.settings.json")),
     ("human_kth.pcad", include_str!("../../../programs/human_kth.pcad")),
     ("human_paper.pcad", include_str!("../../../programs/human_paper.pcad")),
-    ("two_people.pcad", include_str!("../../../programs/two_people.pcad")),
+    ("people.pcad", include_str!("../../../programs/people.pcad")),
     ("autorig.pcad", include_str!("../../../programs/autorig.pcad")),
     ("lathe.pcad", include_str!("../../../programs/lathe.pcad")),
     ("lathe.quality.json", include_str!("../../../programs/lathe.quality.json")),

@@ -25,7 +25,7 @@ static EXAMPLES: [Example; 2] = [
     Example {
         name: "skier.jpg",
         bytes: include_bytes!("../../../examples/images/skier.jpg"),
-        programs: &["human.pcad", "human_kth.pcad", "human_paper.pcad", "two_people.pcad"],
+        programs: &["human.pcad", "human_kth.pcad", "human_paper.pcad", "people.pcad"],
     },
 ];
 

@@ -110,16 +110,16 @@ impl PeopleFinder {
         let scale = f64::from(longer) / f64::from(longer.min(LONGEST));
         let size = (looked_at.width(), looked_at.height());
         let paddings = PADDINGS.into_iter().take(options.views.div_ceil(2).clamp(1, 4) as usize);
-        let person =
+        let in_box =
             |bounds: [f64; 4], score| PersonBox { bounds: bounds.map(|x| x / scale), score };
         let areas: Vec<Area> = match search {
             Search::Within(bounds) => {
-                paddings.map(|p| Area::around(person(bounds, 1.0), DRAWN, size, p)).collect()
+                paddings.map(|p| Area::around(in_box(bounds, 1.0), DRAWN, size, p)).collect()
             }
             Search::Everywhere(objects) => {
                 let whole = paddings.map(|p| Area::whole(size, p));
                 let around =
-                    |o: &FoundObject| Area::around(person(o.bounds, o.score), DETECTED, size, 0.0);
+                    |o: &FoundObject| Area::around(in_box(o.bounds, o.score), DETECTED, size, 0.0);
                 let people = said_to_be_people(objects, (photo.width(), photo.height()));
                 whole.chain(people.into_iter().take(options.most).map(around)).collect()
             }
