@@ -16,7 +16,7 @@ const AROUND: f64 = 0.1;
 const AROUND_ALL: f64 = 1.25;
 /// The minimum overlap (intersection over union) of a detector's box with that of the landmarks
 /// of the person in it, and of a box that a user drew.
-pub(super) const DETECTED: f64 = 0.4;
+pub(super) const DETECTED: f64 = 0.3;
 pub(super) const DRAWN: f64 = 0.2;
 /// The minimum presence of the person in a box.
 const PRESENT: f64 = 0.5;
@@ -69,10 +69,22 @@ impl Area {
         if let Some(run) = self.filling(runs, bounds) {
             return Ok(vec![run]);
         }
-        let all = Window { mirrored, ..square(bounds, AROUND_ALL) };
-        let seen = twice(finder, photo, &all)?;
-        let run = seen.map(|view| Run { score, in_box: self.person, found: view.window, view });
-        Ok(self.filling(run, bounds).into_iter().collect())
+        // The network expects the hips in the middle: of a whole person, or of one whose upper
+        // half is seen.
+        let [left, top, right, bottom] = bounds;
+        let upper = [left, top, right, 2.0 * bottom - top];
+        let mut all = Vec::new();
+        for whole in [bounds, upper] {
+            let window = Window { mirrored, ..square(whole, AROUND_ALL) };
+            let seen = twice(finder, photo, &window)?;
+            all.extend(seen.map(|view| Run {
+                score,
+                in_box: self.person,
+                found: view.window,
+                view,
+            }));
+        }
+        Ok(self.filling(all, bounds).into_iter().collect())
     }
 
     /// Returns the run of the person who fills a box.
