@@ -29,7 +29,8 @@ pub struct RunOptions {
     /// Kernel applications per chain in warm-up, in place of the program's count.
     pub warmup: Option<u64>,
     /// The time limit of the whole run, which ends at the next step. At most half of it
-    /// goes to warm-up.
+    /// goes to the start and the warm-up, unless the steps of the warm-up are given: those are
+    /// made in any case. Each phase makes at least one step.
     pub time: Option<Duration>,
     /// If false, every update re-runs the whole program.
     pub incremental: bool,

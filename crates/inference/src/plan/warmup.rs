@@ -7,6 +7,7 @@ use crate::calls::error::fail;
 use crate::run::ChainError;
 use pcadlang_engine::lang::plan::{Formula, Step};
 use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::Limits;
 use pcadlang_numerics::rng::{Purpose, Stream, StreamKey};
 use pcadlang_syntax::span::Span;
 use std::sync::atomic::Ordering;
@@ -38,6 +39,12 @@ impl<'a> Runner<'a> {
         self.progress.warming.fetch_sub(1, Ordering::Relaxed);
         self.power = 1.0;
         self.warmup_steps = self.step;
+        if let (Some(_), Some(time)) = (self.options.warmup, self.options.time) {
+            let left = time.saturating_sub(self.started.elapsed());
+            let limits = self.trace.limits().clone();
+            let stop = limits.stop.clone().or_within(Some(left));
+            self.trace.set_limits(Limits { stop, ..limits });
+        }
         Ok(if flow == Flow::End && self.is_cancelled() { Flow::End } else { Flow::Next })
     }
 
