@@ -37,8 +37,10 @@ pub struct Shown {
     pub view: Option<ViewValue>,
     /// Its joints beside those that were found in the photograph.
     pub located: Vec<Located>,
-    /// Its pixels, at the size of the photograph.
+    /// Its pixels.
     pub mask: Option<Mask>,
+    /// The width and height of its mask, depth and normals.
+    pub size: Option<[u32; 2]>,
     /// The fraction of the mesh's vertices that are in the picture.
     pub inside: Option<f64>,
     /// How far the chains' last states cover the same pixels: the number of pixels that
@@ -55,6 +57,7 @@ pub fn show_best(
     best: Option<&BestState>,
     chains: &[ChainResult],
     image: Option<&ImageValue>,
+    full_size: bool,
 ) -> Result<Shown, Failure> {
     let Some(best) = best else { return Ok(Shown::default()) };
     let draws = scene::predictive(seed, 0);
@@ -64,8 +67,13 @@ pub fn show_best(
     let mut shown = Shown::default();
     if let Some(view) = scene::view(&mut trace, draws, None) {
         let located = trace.located();
-        draw(dir, &view, &located, chains, seed, image.and_then(ImageValue::as_photo), &mut shown)?;
-        image.map_or(Ok(()), |image| show_seen(dir, image, &located))?;
+        let photo = image.and_then(ImageValue::as_photo);
+        let most = if full_size { u32::MAX } else { LARGEST };
+        let size = bounded(extent(&view, photo), most);
+        draw(dir, &view, &located, (chains, seed), (photo, size), &mut shown)?;
+        let seen =
+            |image: &ImageValue| show_seen(dir, image, bounded(image.size(), most), &located);
+        image.map_or(Ok(()), seen)?;
         shown.view = Some(ViewValue(view));
         shown.located = located;
     }
@@ -91,20 +99,20 @@ pub fn keep_best(dir: &RunDir, model: &Model, best: &BestSoFar, ending: &Ending,
     }
 }
 
-/// Writes depth, normals, mask and meshes at the resolution of the input, and the
-/// overlay, contours and mask frequency as pictures.
+/// Writes depth, normals, mask and meshes, and the overlay, contours and mask frequency as
+/// pictures, of this size.
 fn draw(
     dir: &RunDir,
     view: &Arc<View>,
     located: &[Located],
-    chains: &[ChainResult],
-    seed: u64,
-    photo: Option<&Photo>,
+    (chains, seed): (&[ChainResult], u64),
+    (photo, (width, height)): (Option<&Photo>, (u32, u32)),
     shown: &mut Shown,
 ) -> Result<(), Failure> {
-    let (camera, (width, height)) = (view.camera(), extent(view, photo));
+    let camera = view.camera();
     let size = width.max(height);
     let frame = view.frame(size);
+    shown.size = Some([frame.width, frame.height]);
     let shape = [frame.height as usize, frame.width as usize];
     write_in(dir, "depth.npy", &npy::f32_array(&shape, frame.depth.iter().copied()))?;
     let normals = npy::f32_array(&[shape[0], shape[1], 3], frame.normal.iter().flatten().copied());
@@ -165,10 +173,21 @@ fn mesh(solid: &Solid) -> Option<Mesh> {
     }
 }
 
+/// The longer side of results in pixels, unless all of the photograph's are asked for: more
+/// show no more of a scene that is compared at a few hundred.
+const LARGEST: u32 = 1600;
+
 /// Returns width and height of the picture in which a view is: those of the photograph, if any.
 fn extent(view: &View, photo: Option<&Photo>) -> (u32, u32) {
     let camera = view.camera();
     photo.map_or((camera.width, camera.height), |p| (p.width(), p.height()))
+}
+
+/// Scales a size down to a longer side of at most `most`.
+fn bounded((width, height): (u32, u32), most: u32) -> (u32, u32) {
+    let scale = (f64::from(most) / f64::from(width.max(height).max(1))).min(1.0);
+    let [width, height] = [width, height].map(|n| (f64::from(n) * scale).round().max(1.0) as u32);
+    (width, height)
 }
 
 /// Returns the pixels that the object covers.
@@ -183,7 +202,7 @@ pub fn judged_so_far(ready: &Ready, watched: &Watched) -> Option<Judgement> {
     let (best, draws) = (watched.best.state()?, scene::predictive(0, 0));
     let mut trace = scene::rebuilt(&ready.model, &best.choices, draws).ok()?;
     let view = scene::view(&mut trace, draws, None)?;
-    let (width, height) = extent(&view, ready.photo());
+    let (width, height) = bounded(extent(&view, ready.photo()), LARGEST);
     let object = covered(&view.frame(width.max(height)))?;
     let chains = 0..watched.memories.len();
     let states = chains.filter_map(|chain| watched.trajectory.of_chain(chain).pop());

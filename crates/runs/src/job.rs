@@ -30,12 +30,13 @@ use pcadlang_inference::{
 use pcadlang_library::scene::ImageValue;
 use pcadlang_library::{Model, Started};
 use pcadlang_report::{
-    ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, modes, quantities,
-    table, text_hash, widen, zarr,
+    ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, mark_categories,
+    modes, quantities, table, text_hash, widen, zarr,
 };
 use pcadlang_workbench::bank::BankFiles;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -82,6 +83,9 @@ pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
         let mut s = json!(q.summary);
         if let Some(reason) = q.why_no_r_hat() {
             s["r_hat_reason"] = json!(reason);
+        }
+        if let Some(frequent) = q.frequent {
+            s["most_frequent"] = json!(frequent);
         }
         s["ess_per_second"] = json!(table::per_second(q.summary.ess_bulk, seconds));
         (q.name.clone(), s)
@@ -242,6 +246,8 @@ pub fn perform_watched(
     mode: RunMode,
     watched: &Watched,
 ) -> Result<Outcome, Failure> {
+    let source = ("source_hash".to_owned(), json!(ready.model.source_hash()));
+    let record = &record.clone().into_iter().chain([source]).collect();
     write_record(dir, record, "running", json!({}))?;
     write_in(dir, PROGRAM, ready.model.text().as_bytes())?;
     let chains = job.sampling.chains();
@@ -380,7 +386,11 @@ impl Fill<'_> {
         let Fill { job, ready, dir, watched, .. } = self;
         let Started { chains, mut warnings, .. } = ran;
         let (seed, image) = (job.sampling.seed, &ready.named_image);
-        let quantities = quantities(draws);
+        let mut quantities = quantities(draws);
+        let last = chains.first().map(|c| &c.last);
+        let categories: HashSet<String> =
+            last.map_or_else(Vec::new, |s| s.categories()).into_iter().collect();
+        mark_categories(&mut quantities, |name| categories.contains(name));
         let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
         let modes = modes(&quantities, Some(&self.evidence));
         warnings.extend(pcadlang_report::warnings(&quantities, &modes, &kernels, chains.len()));
@@ -390,7 +400,6 @@ impl Fill<'_> {
             warnings.extend(image.iter().flat_map(of));
         }
         let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
-        let last = chains.first().map(|c| &c.last);
         warnings.extend(last.and_then(|state| structure_warning(state, &sites)));
         warnings.extend(last.and_then(|state| stuck_warning(state, &sites)));
         let inputs = image.as_ref().map(|(name, _)| name.as_str()).zip(ready.image());
@@ -398,7 +407,15 @@ impl Fill<'_> {
         warnings.extend(seen::warnings(inputs, job.keypoints.as_deref(), &located));
         let places = best_of_each(&modes, &watched.best);
         let best = watched.best.state();
-        let drawn = show_best(dir, seed, &ready.model, best.as_deref(), &chains, ready.image())?;
+        let drawn = show_best(
+            dir,
+            seed,
+            &ready.model,
+            best.as_deref(),
+            &chains,
+            ready.image(),
+            job.full_size,
+        )?;
         show_places(dir, seed, &ready.model, &places, ready.photo())?;
         let log_joint = best.as_ref().map_or(f64::NAN, |b| b.log_joint);
         write_scene(dir, seed, ready, (log_joint, &drawn), &watched.kept.all())?;
@@ -421,6 +438,7 @@ impl Fill<'_> {
             }
         }
         let mut more = counts(&chains, best.as_deref(), &quantities);
+        more.extend(drawn.size.map(|size| ("size".into(), json!(size))));
         more.extend(drawn.agreement.map(|a| ("agreement".into(), json!(a))));
         more.extend(judged.as_ref().map(|j| ("found".into(), j.json())));
         let outcome = Outcome {

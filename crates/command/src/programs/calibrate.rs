@@ -57,6 +57,7 @@ pub fn calibrate(a: &Check) -> Result<(), Failure> {
 fn job(a: &Check, path: &str) -> Job {
     Job {
         features_from: None,
+        full_size: false,
         inputs: Inputs {
             program: path.to_owned(),
             sets: a.sets.clone(),

@@ -61,6 +61,7 @@ pub fn arguments(job: &Job) -> Vec<String> {
     s.warmup.iter().for_each(|n| add("warmup", n.to_string()));
     s.time.iter().for_each(|t| add("time", format!("{}ms", t.as_millis())));
     add("quality", "own".into());
+    all.extend(job.full_size.then(|| "--full-size".to_owned()));
     all.extend(g.hint.arguments());
     all
 }

@@ -19,10 +19,14 @@ const QUALITY: u8 = 90;
 /// The margin around the joints, as a fraction of their extent.
 const MARGIN: f64 = 0.15;
 
-/// Writes `photo.jpg`, its contours as `photo_contours.png`, and `joints.png` if any were
+/// Writes, for a picture of this size, `photo.jpg`, its contours as `photo_contours.png`, and `joints.png` if any were
 /// detected.
-pub fn show_seen(dir: &RunDir, image: &ImageValue, located: &[Located]) -> Result<(), Failure> {
-    let (width, height) = image.size();
+pub fn show_seen(
+    dir: &RunDir,
+    image: &ImageValue,
+    (width, height): (u32, u32),
+    located: &[Located],
+) -> Result<(), Failure> {
     let told = |e: image::ImageError| plain(e.to_string());
     if let Some(photo) = image.as_photo() {
         let (w, h) = pictures::picture_size(width, height);
