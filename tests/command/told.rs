@@ -228,3 +228,43 @@ fn a_run_that_never_moved_is_an_error() {
     let d = f.run(&["run", "p.pcad", "--time", "5s", "--out", "out"]);
     assert!(d.code == 1 && d.err.contains("no kernel made a step"), "{} {}", d.code, d.err);
 }
+
+/// The lamp's picture, enlarged to this many pixels along its sides, as a JPEG file.
+fn enlarged(side: u32) -> Vec<u8> {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/images/table_lamp.png");
+    let lamp = image::open(file).unwrap().to_rgb8();
+    let large = image::imageops::resize(&lamp, side, side, image::imageops::FilterType::Nearest);
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    large.write_to(&mut bytes, image::ImageFormat::Jpeg).unwrap();
+    bytes.into_inner()
+}
+
+/// Results of a large photograph are bounded, unless all of it is asked for.
+#[test]
+fn results_of_large_photographs_are_bounded() {
+    let f = Folder::new("large");
+    f.write("large.jpg", enlarged(8000)).write("above.jpg", enlarged(1700));
+    let run = |photo: &str, out: &str, options: &[&str]| {
+        let quick = ["--set", "tries=5", "--set", "keep=2", "--steps", "1", "--warmup", "1"];
+        let run =
+            ["run", "lathe.pcad", "--chains", "1", "--quiet", "--observe", photo, "--out", out];
+        f.succeeds(&[&run[..], &quick, options].concat());
+        let size =
+            |name: &str| image::image_dimensions(f.path().join(format!("{out}/{name}"))).unwrap();
+        let shape = f.path().join(format!("{out}/depth.npy"));
+        let head = String::from_utf8_lossy(&std::fs::read(shape).unwrap()[..128]).into_owned();
+        let side = size("mask.png").0;
+        assert!(head.contains(&format!("'shape': ({side}, {side})")), "{head}");
+        assert_eq!((size("overlay.png"), size("contours.png")), ((side, side), (side, side)));
+        assert_eq!(json(&f, &format!("{out}/run.json"))["size"], serde_json::json!([side, side]));
+        side
+    };
+    assert_eq!(run("large.jpg", "large", &[]), 1600);
+    let bytes = |e: std::io::Result<std::fs::DirEntry>| e.unwrap().metadata().unwrap().len();
+    let all: u64 = std::fs::read_dir(f.path().join("large")).unwrap().map(bytes).sum();
+    assert!(all < 60 << 20, "{all} bytes");
+    assert_eq!(run("above.jpg", "above", &[]), 1600);
+    assert_eq!(run("above.jpg", "above", &["--full-size"]), 1700);
+    let arguments = json(&f, "above/run.json")["arguments"].to_string();
+    assert!(arguments.contains("--full-size"), "the command that repeats it: {arguments}");
+}

@@ -68,8 +68,9 @@ pub fn show_best(
     if let Some(view) = scene::view(&mut trace, draws, None) {
         let located = trace.located();
         let photo = image.and_then(ImageValue::as_photo);
-        let most = if full_size { u32::MAX } else { LARGEST };
+        let most = if full_size { u32::MAX } else { ImageValue::SHOWN };
         let size = bounded(extent(&view, photo), most);
+        let photo = if full_size { photo } else { image.and_then(ImageValue::shown) };
         draw(dir, &view, &located, (chains, seed), (photo, size), &mut shown)?;
         let seen =
             |image: &ImageValue| show_seen(dir, image, bounded(image.size(), most), &located);
@@ -173,10 +174,6 @@ fn mesh(solid: &Solid) -> Option<Mesh> {
     }
 }
 
-/// The longer side of results in pixels, unless all of the photograph's are asked for: more
-/// show no more of a scene that is compared at a few hundred.
-const LARGEST: u32 = 1600;
-
 /// Returns width and height of the picture in which a view is: those of the photograph, if any.
 fn extent(view: &View, photo: Option<&Photo>) -> (u32, u32) {
     let camera = view.camera();
@@ -202,7 +199,7 @@ pub fn judged_so_far(ready: &Ready, watched: &Watched) -> Option<Judgement> {
     let (best, draws) = (watched.best.state()?, scene::predictive(0, 0));
     let mut trace = scene::rebuilt(&ready.model, &best.choices, draws).ok()?;
     let view = scene::view(&mut trace, draws, None)?;
-    let (width, height) = bounded(extent(&view, ready.photo()), LARGEST);
+    let (width, height) = bounded(extent(&view, ready.photo()), ImageValue::SHOWN);
     let object = covered(&view.frame(width.max(height)))?;
     let chains = 0..watched.memories.len();
     let states = chains.filter_map(|chain| watched.trajectory.of_chain(chain).pop());

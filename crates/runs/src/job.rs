@@ -416,7 +416,7 @@ impl Fill<'_> {
             ready.image(),
             job.full_size,
         )?;
-        show_places(dir, seed, &ready.model, &places, ready.photo())?;
+        show_places(dir, seed, &ready.model, &places, ready.image().and_then(ImageValue::shown))?;
         let log_joint = best.as_ref().map_or(f64::NAN, |b| b.log_joint);
         write_scene(dir, seed, ready, (log_joint, &drawn), &watched.kept.all())?;
         let places = ready.image().and_then(ImageValue::known_places);

@@ -41,13 +41,11 @@ impl RunSummary {
 
     /// Returns the program, and the options with their values.
     fn settings(&self) -> Vec<String> {
-        let (mut all, mut arguments) = (Vec::new(), self.arguments().into_iter());
+        let (mut all, mut arguments) = (Vec::new(), self.arguments().into_iter().peekable());
         while let Some(a) = arguments.next() {
-            all.push(if a.starts_with("--") {
-                format!("{a} {}", arguments.next().unwrap_or_default())
-            } else {
-                a
-            });
+            // Some options have no value.
+            let value = arguments.next_if(|v| a.starts_with("--") && !v.starts_with("--"));
+            all.push(value.map_or(a.clone(), |value| format!("{a} {value}")));
         }
         all
     }

@@ -28,9 +28,9 @@ pub fn show_seen(
     located: &[Located],
 ) -> Result<(), Failure> {
     let told = |e: image::ImageError| plain(e.to_string());
-    if let Some(photo) = image.as_photo() {
+    if let (Some(photo), Some(shown)) = (image.as_photo(), image.shown()) {
         let (w, h) = pictures::picture_size(width, height);
-        let small = sized(photo.rgb(), w.max(h).min(LARGEST));
+        let small = sized(shown.rgb(), w.max(h).min(LARGEST));
         let bytes = jpeg(&small, QUALITY).map_err(told)?;
         write_in(dir, "photo.jpg", &bytes)?;
         if let Some(joints) = joints(photo.rgb(), located) {
