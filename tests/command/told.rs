@@ -268,3 +268,27 @@ fn results_of_large_photographs_are_bounded() {
     let arguments = json(&f, "above/run.json")["arguments"].to_string();
     assert!(arguments.contains("--full-size"), "the command that repeats it: {arguments}");
 }
+
+/// The search of a preset ends on any machine, however busy: time limits what follows.
+#[test]
+fn the_search_of_a_preset_ends() {
+    let f = Folder::new("preset");
+    let root = env!("CARGO_MANIFEST_DIR");
+    let lamp = format!("{root}/examples/images/table_lamp.png");
+    std::fs::copy(lamp, f.path().join("lamp.png")).unwrap();
+    let least = |name: &str| -> Vec<u64> {
+        let text = std::fs::read_to_string(format!("{root}/programs/{name}.quality.json")).unwrap();
+        let presets: Value = serde_json::from_str(&text).unwrap();
+        let front = presets["front"].as_array().unwrap().iter();
+        front.map(|p| p["search"]["warmup"].as_u64().unwrap_or(0)).collect()
+    };
+    assert!(least("human").iter().all(|n| *n > 0));
+    let [fast, ..] = least("lathe")[..] else { panic!() };
+    let run = ["run", "lathe.pcad", "--observe", "lamp.png", "--quality", "fast", "--quiet"];
+    // No time at all is left for it.
+    f.succeeds(&[&run[..], &["--time", "1ms", "--out", "out"]].concat());
+    for c in json(&f, "out/run.json")["chains"].as_array().unwrap() {
+        let [warmup, steps] = ["warmup", "steps"].map(|k| c[k].as_u64().unwrap());
+        assert_eq!((warmup, steps), (fast, 1));
+    }
+}

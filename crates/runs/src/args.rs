@@ -8,6 +8,7 @@ use crate::hint::HintArgs;
 use crate::people::PersonArgs;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueHint};
+use pcadlang_inference::Search;
 use pcadlang_workbench::tradeoff::Quality;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -100,6 +101,9 @@ pub struct Sampling {
     /// preset for that time, unless --quality is given
     #[arg(long, value_parser = duration)]
     pub time: Option<Duration>,
+    /// What the start and the warm-up make in any case, by a preset.
+    #[arg(skip)]
+    pub search: Search,
     /// Re-run the whole program at each step: the same draws, but slow; for testing the
     /// engine
     #[arg(long)]

@@ -276,6 +276,7 @@ pub fn options(job: &Job, ready: &Ready, callback: Option<Arc<dyn Callback>>) ->
         warmup: s.warmup,
         // The time left after compilation.
         time: s.time.map(|t| t.saturating_sub(ready.begun.elapsed())),
+        search: s.search,
         incremental: !s.no_incremental,
         limits: model.limits().clone(),
         callback,

@@ -110,6 +110,7 @@ fn apply_preset(job: &mut Job, choice: &Choice, name: &str) -> String {
         s.warmup = Some(warmup);
         said.push(format!("--warmup {warmup}"));
     }
+    s.search = choice.preset.search.unwrap_or_default();
     let [low, high] = choice.preset.interval;
     let (error, cases) = (choice.preset.error, choice.preset.cases);
     format!(

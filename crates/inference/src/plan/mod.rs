@@ -49,7 +49,8 @@ pub(crate) fn run_chain(
     }
     let (how, from, forced) = shared.get(|| start_of(code, plan, options))?;
     // Under a time limit a quarter of it is for the start, as much as that leaves to warm-up.
-    let how = Start { within: search_time(options).map(|t| t / 4), ..how };
+    let within = options.time.filter(|_| options.warmup.is_none()).map(|t| t / 4);
+    let how = Start { within, least: options.search.draws, ..how };
     check(code, &plan.steps, options)?;
     let (seeded, limits) = ((options.seed, chain), &options.limits);
     let start = |forced| starts_from(code, seeded, how, (from.as_ref(), forced), limits.clone());
@@ -103,10 +104,10 @@ fn check(code: &Code, steps: &[Step], options: &RunOptions) -> Result<(), Box<Ru
     Ok(())
 }
 
-/// The time limit that a chain starts with. If the steps of the warm-up are given, the start
-/// and the warm-up are made whatever time they take, and only what follows is limited.
+/// The time limit in which evaluations must end from the beginning of a chain on. If the start
+/// and the warm-up are made whatever time they take, only what follows is limited.
 fn search_time(options: &RunOptions) -> Option<Duration> {
-    options.time.filter(|_| options.warmup.is_none())
+    options.time.filter(|_| options.warmup.is_none() && options.search.warmup == 0)
 }
 
 /// The options of a chain, with limits by which it can also be stopped in the middle of

@@ -466,10 +466,11 @@ impl<'a> Runner<'a> {
     }
 
     /// True if the run, or its warm-up, has used up its time. A warm-up whose steps are given
-    /// makes all of them.
+    /// makes all of them, and any makes those of a search.
     fn is_late(&self) -> bool {
+        let searches = self.options.warmup.is_some() || self.used() < self.options.search.warmup;
         match self.options.time {
-            Some(_) if self.in_warmup && self.options.warmup.is_some() => false,
+            Some(_) if self.in_warmup && searches => false,
             Some(t) => self.started.elapsed() >= if self.in_warmup { t / 2 } else { t },
             None => false,
         }
