@@ -254,7 +254,7 @@ fn results_of_large_photographs_are_bounded() {
         let shape = f.path().join(format!("{out}/depth.npy"));
         let head = String::from_utf8_lossy(&std::fs::read(shape).unwrap()[..128]).into_owned();
         let side = size("mask.png").0;
-        assert!(head.contains(&format!("'shape': ({side}, {side})")), "{head}");
+        assert!(head.contains(&format!("'shape': ({side}, {side}")), "{head}");
         assert_eq!((size("overlay.png"), size("contours.png")), ((side, side), (side, side)));
         assert_eq!(json(&f, &format!("{out}/run.json"))["size"], serde_json::json!([side, side]));
         side
