@@ -52,14 +52,11 @@ impl Update {
     /// Returns the number that a choice is about to become, if that is certain: it is the only
     /// change, so that the choice's distribution stays.
     fn next_number(&self, store: &Store, n: NodeId) -> Option<f64> {
-        match (&self.pending[..], &store[n].value) {
-            ([Pending { node, element: NONE, change }], Value::Num(_))
-                if *node == n && store.is_plain_choice(n) =>
-            {
-                match change {
-                    Change::Set(Datum::Num(x)) | Change::Value(Datum::Num(x)) => Some(*x),
-                    _ => None,
-                }
+        let [Pending { node, element: NONE, change }] = &self.pending[..] else { return None };
+        let is_number = matches!(store[n].value, Value::Num(_)) && store.is_plain_choice(n);
+        match change {
+            Change::Set(Datum::Num(x)) | Change::Value(Datum::Num(x)) => {
+                (is_number && *node == n).then_some(*x)
             }
             _ => None,
         }
