@@ -243,6 +243,7 @@ fn checks_by_simulation() {
     ] {
         assert!(both.out.contains(says), "{says:?} is not in\n{}", both.out);
     }
+    assert!(both.err.contains("this takes about "), "{}", both.err);
     // A plan that never moves keeps the prior, which is wrong whenever the data are
     // informative.
     f.write(

@@ -262,3 +262,36 @@ fn included_files_have_their_own_mistakes() {
     assert_eq!((&cleared["uri"], &cleared["diagnostics"]), (&json!(part), &json!([])));
     c.end();
 }
+
+/// The signature of the call around the cursor, with the argument that is being written.
+#[test]
+fn signatures_follow_the_cursor() {
+    let text = "fn line(x, slope) { slope * x }
+let a = line(1, [2, 3]);
+let b = map(fn(i) { i }, [max(1, (2 + 3)), \"x(,\"]);
+assume c ~ truncated_normal(0, sd = 1);
+";
+    let mut c = Client::new();
+    c.open(text);
+    let mut help = |line: u32, before: &str| -> Option<(String, String)> {
+        let column = text.lines().nth(line as usize).unwrap().find(before).unwrap() as u32;
+        let found = c.ask("textDocument/signatureHelp", at(line, column + before.len() as u32));
+        let signature = found.get("signatures")?[0].clone();
+        let label = signature["label"].as_str().unwrap().to_owned();
+        let active = signature["activeParameter"].as_u64().unwrap() as usize;
+        let place = &signature["parameters"][active]["label"];
+        let part = place.as_array().map_or(String::new(), |place| {
+            let [from, to] = [0, 1].map(|i| place[i].as_u64().unwrap() as usize);
+            label.chars().skip(from).take(to - from).collect()
+        });
+        Some((label, part))
+    };
+    let is = |label: &str, part: &str| Some((label.to_owned(), part.to_owned()));
+    assert_eq!(help(1, "line("), is("line(x, slope)", "x"));
+    assert_eq!(help(1, "line(1, [2, "), is("line(x, slope)", "slope"));
+    assert_eq!(help(2, "max(1, (2 + 3"), is("max(x, …)", "x"));
+    assert_eq!(help(1, "let a"), None);
+    let (label, part) = help(3, "truncated_normal(0, sd = ").unwrap();
+    assert!(label.starts_with("truncated_normal(") && part.starts_with("sd"), "{label} {part}");
+    c.end();
+}

@@ -18,4 +18,5 @@ mod repl;
 mod report;
 mod runs;
 mod studio;
+mod told;
 mod tradeoff;

@@ -16,6 +16,9 @@ pub struct Completions {
 /// `man`.
 #[derive(Args, Debug)]
 pub struct Man {
+    /// The command whose page is printed, such as run [default: the page of pcadlang]
+    #[arg(value_name = "COMMAND", conflicts_with = "out")]
+    pub command: Option<String>,
     /// The folder to write the pages to, one per command: pcadlang.1, pcadlang-run.1, …
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub out: Option<PathBuf>,
@@ -28,19 +31,35 @@ pub fn completions(a: &Completions, mut command: Command) -> Result<(), Failure>
     print(&script)
 }
 
-/// Prints the manual page of the command, or writes those of all commands to a folder.
+/// Prints the manual page of the program or of a command, or writes all of them to a folder.
 pub fn man(a: &Man, command: Command) -> Result<(), Failure> {
     let mut command = command.disable_help_subcommand(true);
     command.build();
+    if let Some(name) = &a.command {
+        let sub = command.find_subcommand(name).ok_or_else(|| unknown(name, &command))?;
+        return print(&page(&named(sub))?);
+    }
     let Some(folder) = &a.out else { return print(&page(&command)?) };
     std::fs::create_dir_all(folder)
         .map_err(|e| plain(format!("cannot make {}: {e}", folder.display())))?;
     files::write(&folder.join("pcadlang.1"), &page(&command)?)?;
     for sub in command.get_subcommands() {
-        let name = format!("pcadlang-{}", sub.get_name());
-        files::write(&folder.join(format!("{name}.1")), &page(&sub.clone().display_name(name))?)?;
+        let sub = named(sub);
+        let name = sub.get_display_name().unwrap_or_default();
+        files::write(&folder.join(format!("{name}.1")), &page(&sub)?)?;
     }
     Ok(())
+}
+
+/// A command under the name of its page, such as pcadlang-run.
+fn named(command: &Command) -> Command {
+    command.clone().display_name(format!("pcadlang-{}", command.get_name()))
+}
+
+fn unknown(name: &str, command: &Command) -> Failure {
+    let all: Vec<&str> = command.get_subcommands().map(Command::get_name).collect();
+    plain(format!("there is no command `{name}`"))
+        .hint(format!("the commands are {}", all.join(", ")))
 }
 
 /// Renders a manual page.

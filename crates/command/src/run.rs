@@ -2,20 +2,28 @@
 
 use crate::args::{Job, Live, Run};
 use crate::programs::explain::{Explanation, explain};
+use pcadlang_engine::lang::plan::{Plan, StepKind};
+use pcadlang_inference::ChainResult;
 use pcadlang_report::{RunDir, modes_table, seconds, table};
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::files::write_in;
 use pcadlang_runs::job::{self, Interrupt, Outcome, RunMode};
 use pcadlang_runs::print::paragraph;
 use pcadlang_runs::verdict::Judgement;
-use pcadlang_runs::{inputs, quality, resume};
+use pcadlang_runs::{inputs, quality, record, resume, term};
+use pcadlang_syntax::diag::render;
 use serde_json::json;
+use std::io::IsTerminal;
 use std::path::Path;
 
 /// Runs a program and writes its folder.
 pub fn run(a: &Run) -> Result<(), Failure> {
     let job = &quality::filled(&a.job, a.quiet)?;
     let ready = inputs::prepare(job, a.quiet)?;
+    let (sources, warnings) = ready.model.warnings();
+    if !warnings.is_empty() && !a.quiet {
+        error_text!("{}", render(sources, warnings, term::has_colors()));
+    }
     let (_, default_plan) = ready.model.plan()?;
     if let (Some(text), false) = (&default_plan, a.quiet) {
         error_line!(
@@ -24,12 +32,14 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     }
     a.live.iter().try_for_each(Live::check)?;
     let interrupt = Interrupt::listen();
-    let record = job::record(job, ready.model.hash(), &job::inputs_hash(job, &ready.model)?);
+    let record = record::of(job, ready.model.hash(), &record::inputs_hash(job, &ready.model)?);
     let (runs, name) = (Path::new("runs"), job::stem(&job.inputs.program));
-    if let Some(path) =
-        a.out.as_ref().filter(|path| !a.resume && !a.quiet && resume::left(path).is_some())
-    {
-        error_line!("note: replacing the earlier run in {}", path.display());
+    if let Some(path) = a.out.as_ref().filter(|_| !a.resume) {
+        let asks = !(a.quiet || a.json || a.stream);
+        replaces(path, &job.inputs.program, a.overwrite, asks)?;
+        if !a.quiet && resume::left(path).is_some() {
+            error_line!("note: replacing the earlier run in {}", path.display());
+        }
     }
     let dir = match &a.out {
         Some(path) if a.resume => resume::resumed(path, &record)?,
@@ -52,7 +62,45 @@ pub fn run(a: &Run) -> Result<(), Failure> {
         write_in(&dir, "explained.json", &text)?;
     }
     show(a, job, &dir, &outcome, explained.as_ref());
-    if outcome.interrupted { Err(Failure::Interrupted) } else { Ok(()) }
+    if outcome.interrupted {
+        return Err(Failure::Interrupted);
+    }
+    match job.sampling.time.filter(|_| job.sampling.steps != Some(0)) {
+        Some(_) if made_no_step(&outcome, &ready.model.plan()?.0) => Err(unmoved()),
+        _ => Ok(()),
+    }
+}
+
+/// Makes sure that the run of another program in a folder may be replaced: the user says so,
+/// by an option or when asked in a terminal.
+fn replaces(path: &Path, program: &str, overwrite: bool, asks: bool) -> Result<(), Failure> {
+    let Some(other) = resume::other_program(path, program).filter(|_| !overwrite) else {
+        return Ok(());
+    };
+    let said = format!("{} holds a run of {other}", path.display());
+    if asks && std::io::stdin().is_terminal() && term::is_live() {
+        error_text!("{said}: replace it? [y/N] ");
+        let mut answer = String::new();
+        let _ = std::io::stdin().read_line(&mut answer);
+        if matches!(answer.trim(), "y" | "Y" | "yes") {
+            return Ok(());
+        }
+    }
+    Err(plain(said).hint("choose another folder with --out, or replace it with --overwrite"))
+}
+
+/// Returns whether some chain made no step, although the plan has kernels and there are choices
+/// to move.
+fn made_no_step(o: &Outcome, plan: &Plan) -> bool {
+    let applies = |kind: &StepKind| matches!(kind, StepKind::Apply(_) | StepKind::Mix(_));
+    let still = |c: &ChainResult| c.steps + c.warmup == 0 && c.last.choice_count() > 0;
+    plan.steps.iter().any(|s| s.any(&applies)) && o.chains.iter().any(still)
+}
+
+/// Says that the draws of a run with a time limit are not of the posterior.
+fn unmoved() -> Failure {
+    plain("no kernel made a step, so the draws are those that the chains started from, not of the posterior")
+        .hint("raise --time, or see whether the plan ends before its kernels")
 }
 
 /// Prints the results at the end of a run.

@@ -29,8 +29,11 @@ pub struct Start {
     /// How many of the best are kept: with more than one, warm-up begins with a
     /// population that anneals.
     pub keep: usize,
-    /// A time limit: once a draw has succeeded, no further ones are made after it.
+    /// A time limit: once `least` draws have succeeded, and one in any case, no further ones are
+    /// made after it.
     pub within: Option<Duration>,
+    /// See `within`.
+    pub least: u64,
 }
 
 /// Where the draws come from that a chain may start with, and which of them is taken.
@@ -47,7 +50,7 @@ pub enum By {
 
 impl Default for Start {
     fn default() -> Self {
-        Start { draws: 1, keep: 1, by: By::Likelihood, within: None }
+        Start { draws: 1, keep: 1, by: By::Likelihood, within: None, least: 0 }
     }
 }
 
@@ -183,7 +186,7 @@ pub(crate) fn starts_from(
             Err(e) if e.is_recoverable() => last = Some(Err(e)),
             Err(e) => return Err(StartError::Run(e)),
         }
-        let late = || how.within.is_some_and(|t| begun.elapsed() >= t);
+        let late = || found >= how.least && how.within.is_some_and(|t| begun.elapsed() >= t);
         if found > 0 && (limits.stop.is_asked() || late()) || found == 0 && attempt + 1 >= RETRIES {
             break;
         }

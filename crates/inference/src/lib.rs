@@ -55,7 +55,7 @@ use pcadlang_numerics::platform::threads as parallel;
 pub use pcadlang_numerics::platform::threads::in_parallel;
 pub use plan::checkpoint::Checkpoint;
 pub use plan::run_from;
-pub use run::{ChainError, ChainResult, Progress, RunOptions, run_chains};
+pub use run::{ChainError, ChainResult, Progress, RunOptions, Search, run_chains};
 pub use state::StateError;
 pub use state::{pack, unpack};
 pub use structure::{stuck_structure, stuck_together};

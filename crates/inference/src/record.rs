@@ -3,7 +3,7 @@
 use super::draws::{Column, MOST_POINTS, POINTWISE, Shape, merged};
 use pcadlang_engine::lang::code::{Code, Operand};
 use pcadlang_engine::lang::error::RunError;
-use pcadlang_engine::lang::plan::{Plan, StepKind};
+use pcadlang_engine::lang::plan::Plan;
 use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::{Draws, Trace};
 
@@ -20,9 +20,7 @@ pub(crate) struct Recorder {
 impl Recorder {
     /// A recorder for a plan.
     pub fn new(plan: &Plan) -> Self {
-        let is = |s: &StepKind| matches!(s, StepKind::Collect(_));
-        let collects = plan.steps.iter().any(|s| s.any(&is));
-        Recorder { collects, columns: Vec::new(), observed: None }
+        Recorder { collects: plan.collected().is_some(), columns: Vec::new(), observed: None }
     }
 
     /// True if the plan says what to collect.

@@ -14,6 +14,7 @@ use pcadlang_engine::lang::code::Code;
 use pcadlang_engine::lang::error::RunError;
 use pcadlang_engine::lang::plan::Plan;
 use pcadlang_engine::trace::{Constraint, Limits, Trace};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64};
 use std::time::{Duration, Instant};
@@ -29,8 +30,11 @@ pub struct RunOptions {
     /// Kernel applications per chain in warm-up, in place of the program's count.
     pub warmup: Option<u64>,
     /// The time limit of the whole run, which ends at the next step. At most half of it
-    /// goes to warm-up.
+    /// goes to the start and the warm-up, unless the steps of the warm-up are given, which are
+    /// made in any case, or `search` says more. Each phase makes at least one step.
     pub time: Option<Duration>,
+    /// What the start and the warm-up make however little time there is.
+    pub search: Search,
     /// If false, every update re-runs the whole program.
     pub incremental: bool,
     /// Limits on what the program may build.
@@ -57,6 +61,7 @@ impl Default for RunOptions {
             steps: None,
             warmup: None,
             time: None,
+            search: Search::default(),
             incremental: true,
             limits: Limits::default(),
             callback: None,
@@ -66,6 +71,16 @@ impl Default for RunOptions {
             first_chain: 0,
         }
     }
+}
+
+/// The least that a chain makes of a search for where the posterior is, under a time limit: on a
+/// busy machine it takes longer, and time limits what follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Search {
+    /// Draws of the start, of those that the plan says.
+    pub draws: u64,
+    /// Steps of the warm-up, of those that the plan says.
+    pub warmup: u64,
 }
 
 /// State shared between the chains and the code that monitors them.

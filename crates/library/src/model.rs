@@ -32,6 +32,7 @@ pub struct Model {
     sources: SourceMap,
     text: String,
     hash: String,
+    source_hash: String,
     data_hash: String,
     reach: Reach,
     limits: Limits,
@@ -58,10 +59,20 @@ impl Model {
         &self.hash
     }
 
+    /// Returns a hash of the program's text and of the files that it includes.
+    pub fn source_hash(&self) -> &str {
+        &self.source_hash
+    }
+
     /// Returns a hash of the files that the program itself reads: the defaults of its
     /// `data` items.
     pub fn data_hash(&self) -> &str {
         &self.data_hash
+    }
+
+    /// Returns what is suspicious in the program, and its sources.
+    pub fn warnings(&self) -> (&SourceMap, &[Diagnostic]) {
+        (&self.sources, &self.compiled.warnings)
     }
 
     /// Returns the text of the main file.

@@ -1,8 +1,11 @@
 //! The draws of a chain in memory, and the scalar quantities in them.
 
+use super::table::number;
 use pcadlang_inference::diagnostics::{Summary, summary};
 use pcadlang_inference::draws::{Column, DrawRow, Layout, POINTWISE, Shape, merged, width};
+use serde::Serialize;
 use std::borrow::Cow;
+use std::fmt;
 
 /// The draws of one chain.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,7 +81,7 @@ impl ChainDraws {
 /// Converts all chains to the union of their columns, with NaN where a draw lacks one.
 pub fn widen(chains: &mut [ChainDraws]) {
     let Some(all) = common(chains) else { return };
-    chains.iter_mut().filter(|c| !c.rows.is_empty()).for_each(|c| c.widen(all.clone()));
+    chains.iter_mut().for_each(|c| c.widen(all.clone()));
 }
 
 /// Returns the union of the columns of all chains, if they are not all the same.
@@ -101,12 +104,54 @@ pub struct Quantity {
     pub chains: Vec<Vec<f64>>,
     /// The summary of the draws.
     pub summary: Summary,
+    /// The most frequent value, if values are numbers of categories, which have no mean.
+    pub frequent: Option<Frequent>,
+}
+
+/// The most frequent of several values.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Frequent {
+    /// The value; the smallest, if several are as frequent.
+    pub value: f64,
+    /// The fraction of draws with that value.
+    pub share: f64,
+}
+
+impl Frequent {
+    /// Returns the most frequent number; `None` if there are none, or one is NaN.
+    pub(super) fn of<'a>(numbers: impl Iterator<Item = &'a f64>) -> Option<Frequent> {
+        let mut all: Vec<f64> = numbers.copied().collect();
+        all.sort_by(f64::total_cmp);
+        if all.last()?.is_nan() {
+            return None;
+        }
+        let mut most = (0, 0.0);
+        for run in all.chunk_by(|a, b| a == b) {
+            if run.len() > most.0 {
+                most = (run.len(), run[0]);
+            }
+        }
+        Some(Frequent { value: most.1, share: most.0 as f64 / all.len() as f64 })
+    }
+}
+
+impl fmt::Display for Frequent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({:.0}%)", number(self.value), 100.0 * self.share)
+    }
+}
+
+/// Marks the quantities whose values are numbers of categories, by their names.
+pub fn mark_categories(quantities: &mut [Quantity], is: impl Fn(&str) -> bool) {
+    for q in quantities.iter_mut().filter(|q| is(&q.name)) {
+        q.frequent = Frequent::of(q.chains.iter().flatten());
+    }
 }
 
 /// Returns every scalar quantity of the chains with its summary, starting with the log
 /// joint density (`log_joint`). The columns are the union of those of all chains, with
-/// NaN where a draw lacks one. A column that repeats the log joint density is left
-/// out, and so are the log densities of single observed values.
+/// NaN where a draw lacks one. A column that repeats the log joint density, in the draws that
+/// have it, is left out, and so are the log densities of single observed values.
 pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     let mut chains = Cow::Borrowed(chains);
     if common(&chains).is_some() {
@@ -116,7 +161,7 @@ pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     let quantity = |name: String, column, value: &dyn Fn(&DrawRow) -> Option<f64>| {
         let series: Vec<Vec<f64>> =
             chains.iter().map(|c| c.rows.iter().filter_map(value).collect()).collect();
-        Quantity { name, column, summary: summary(&series), chains: series }
+        Quantity { name, column, summary: summary(&series), chains: series, frequent: None }
     };
     let mut out = vec![quantity("log_joint".into(), None, &|r| Some(r.log_joint))];
     let columns = chains.iter().map(|c| &c.columns[..]).find(|c| !c.is_empty()).unwrap_or_default();
@@ -144,10 +189,12 @@ pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     out
 }
 
-/// Returns whether the numbers at index `at` of all rows are the log joint density.
+/// Returns whether the numbers at index `at` of all rows are the log joint density, or NaN in
+/// rows that lack the column.
 fn repeats(chains: &[ChainDraws], at: usize) -> bool {
     let mut rows = chains.iter().flat_map(|c| &c.rows);
-    rows.all(|r| r.values.get(at).is_some_and(|x| x.to_bits() == r.log_joint.to_bits()))
+    let same = |x: f64, r: &DrawRow| x.is_nan() || x.to_bits() == r.log_joint.to_bits();
+    rows.all(|r| r.values.get(at).is_some_and(|x| same(*x, r)))
 }
 
 #[cfg(test)]
@@ -179,6 +226,15 @@ mod tests {
             3,
             "another thing of that name stays"
         );
+        // A chain that collects something else lacks the column.
+        let other = ChainDraws {
+            columns: vec![Column::scalar("b")],
+            rows: vec![DrawRow { log_joint: 3.0, values: vec![8.0], ..DrawRow::default() }],
+            ..Default::default()
+        };
+        let both = quantities(&[chain(vec![row(1.0, 1.0)]), other]);
+        assert_eq!(both.iter().map(|q| &*q.name).collect::<Vec<_>>(), ["log_joint", "b"]);
+        assert_eq!(both[0].chains, [[1.0], [3.0]]);
     }
 
     #[test]

@@ -32,7 +32,7 @@ pub use aligned::{align, rename, reread};
 pub use atomic_write::write_file;
 pub use checkpoint::{bytes_hash, text_hash};
 pub use draws::widen;
-pub use draws::{ChainDraws, Quantity, quantities};
+pub use draws::{ChainDraws, Frequent, Quantity, mark_categories, quantities};
 pub use modes::{DISAGREE, Mode, modes, modes_table};
 pub use moments::{Moments, Point};
 pub use pcadlang_inference::diagnostics::Summary;

@@ -1,7 +1,7 @@
 //! The modes of chains that disagree, reported separately in addition to the means over
 //! all chains.
 
-use super::{Quantity, number, table};
+use super::{Frequent, Quantity, number, table};
 use indexmap::IndexMap;
 use pcadlang_inference::diagnostics;
 use pcadlang_inference::{Evidence, Weighed};
@@ -149,7 +149,13 @@ pub(super) fn modes_rows(modes: &[Mode], quantities: &[Quantity]) -> Vec<Vec<Str
     differ.truncate(SHOWN.1);
     let first = quantities.first().filter(|f| !differ.iter().any(|q| q.name == f.name));
     for q in first.into_iter().chain(differ) {
-        rows.push(row(&q.name, number(q.summary.mean), &|m| number(mean(q, m))));
+        rows.push(match q.frequent {
+            Some(all) => row(&q.name, all.to_string(), &|m| {
+                let own = m.chains.iter().filter_map(|c| q.chains.get(c.checked_sub(1)?));
+                Frequent::of(own.flatten()).map_or("-".into(), |f| f.to_string())
+            }),
+            None => row(&q.name, number(q.summary.mean), &|m| number(mean(q, m))),
+        });
     }
     table::narrowed(rows)
 }
@@ -198,7 +204,13 @@ mod tests {
     fn quantity(name: &str, centres: [f64; 4]) -> Quantity {
         let chains: Vec<Vec<f64>> =
             centres.iter().zip(0..).map(|(c, s)| noise(13 + 977 * s, *c)).collect();
-        Quantity { name: name.into(), column: None, summary: summary(&chains), chains }
+        Quantity {
+            name: name.into(),
+            column: None,
+            summary: summary(&chains),
+            chains,
+            frequent: None,
+        }
     }
 
     #[test]

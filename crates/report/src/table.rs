@@ -30,7 +30,8 @@ pub fn aligned(rows: &[Vec<String>]) -> String {
 }
 
 /// Formats mean, standard deviation, 90 % interval, effective sample size (also per
-/// second of the kernels' time) and R-hat of each quantity.
+/// second of the kernels' time) and R-hat of each quantity; of a category its most frequent
+/// value and the share of that.
 pub fn quantities(quantities: &[Quantity], kernel_seconds: f64) -> String {
     summaries(quantities, Some(kernel_seconds))
 }
@@ -59,9 +60,13 @@ fn summaries(quantities: &[Quantity], seconds: Option<f64>) -> String {
             continue;
         }
         let s = &q.summary;
+        // The number of a category means nothing as a number.
+        let [mean, sd, low, high] = match q.frequent {
+            Some(f) => [f.to_string(), "-".into(), "-".into(), "-".into()],
+            None => [s.mean, s.sd, s.q05, s.q95].map(number),
+        };
         let ess = if s.ess_bulk.is_nan() { "-".into() } else { format!("{:.0}", s.ess_bulk) };
-        let cells =
-            [q.name.clone(), number(s.mean), number(s.sd), number(s.q05), number(s.q95), ess];
+        let cells = [q.name.clone(), mean, sd, low, high, ess];
         let rate = seconds.and_then(|t| per_second(s.ess_bulk, t)).map_or("-".into(), whole);
         rows.push(row(cells, [rate, r_hat_text(s.r_hat)]));
     }
@@ -260,6 +265,7 @@ drift(one(@**))          0         -       1  0.50 s
             column: Some(0),
             summary: pcadlang_inference::diagnostics::summary(&chains),
             chains: chains.clone(),
+            frequent: None,
         };
         let long = format!("{}/last[3]", "deep/".repeat(40));
         let text = quantities(&[of(long), of("é".repeat(200))], 0.5);

@@ -32,7 +32,7 @@ pub fn warnings(
     if let Some((r, name)) = worst(quantities, |q| q.summary.r_hat).filter(|(r, _)| *r > 1.01) {
         let what =
             if r > DISAGREE { "the chains disagree" } else { "the chains may not have mixed" };
-        let r = if r > 100.0 { "above 100".to_owned() } else { format!("{r:.2}") };
+        let r = if r > 100.0 { "above 100".to_owned() } else { above(r, 1.01) };
         out.push(format!(
             "{what}: R-hat of {name} is {r} (it should be at most 1.01); run longer with --time or --steps"
         ));
@@ -88,6 +88,13 @@ pub fn warnings(
     out
 }
 
+/// Formats a number above a bound, to two decimals or as many more as still show that it is.
+fn above(x: f64, bound: f64) -> String {
+    let texts = (2..17).map(|decimals| format!("{x:.decimals$}"));
+    let shows = |text: &String| text.parse().is_ok_and(|shown: f64| shown > bound);
+    texts.into_iter().find(shows).unwrap_or_else(|| x.to_string())
+}
+
 /// Returns the largest value of `f` that is not NaN, and the name of its quantity.
 fn worst(quantities: &[Quantity], f: impl Fn(&Quantity) -> f64) -> Option<(f64, &str)> {
     let known = quantities.iter().map(|q| (f(q), &*q.name)).filter(|(x, _)| !x.is_nan());
@@ -106,7 +113,13 @@ mod tests {
     use pcadlang_inference::diagnostics::summary;
 
     fn quantity(name: &str, chains: Vec<Vec<f64>>) -> Quantity {
-        Quantity { name: name.into(), column: None, summary: summary(&chains), chains }
+        Quantity {
+            name: name.into(),
+            column: None,
+            summary: summary(&chains),
+            chains,
+            frequent: None,
+        }
     }
 
     /// Returns numbers between 0 and 1 without any order.
@@ -150,6 +163,13 @@ mod tests {
                 && w[2].contains("for far (at least 200 recommended)"),
             "{w:?}"
         );
+    }
+
+    /// R-hat never reads "1.01 (it should be at most 1.01)".
+    #[test]
+    fn numbers_above_a_bound_show_that_they_are() {
+        let texts = [1.0104, 1.010_000_2, 1.0151, 1.3, 2.0].map(|x| above(x, 1.01));
+        assert_eq!(texts, ["1.0104", "1.0100002", "1.02", "1.30", "2.00"]);
     }
 
     #[test]

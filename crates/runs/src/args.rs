@@ -8,6 +8,7 @@ use crate::hint::HintArgs;
 use crate::people::PersonArgs;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueHint};
+use pcadlang_inference::Search;
 use pcadlang_workbench::tradeoff::Quality;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -91,13 +92,18 @@ pub struct Sampling {
     /// Kernel applications per chain in warm-up, overriding the program's
     #[arg(long)]
     pub warmup: Option<u64>,
-    /// A measured preset of speed and accuracy; `own` uses the program's own settings
+    /// A measured preset of speed and accuracy, or 10, 30 or 120 seconds for a program
+    /// without; `own` uses the program's own settings
     #[arg(long, value_parser = QualityArg::parser())]
     pub quality: Option<QualityArg>,
     /// The total time (of a dataset: per case), such as 10s, 2m or 500ms; at most half is
-    /// warm-up. Selects the measured preset for that time, unless --quality is given
+    /// warm-up, unless --warmup gives its steps, which are all made. Selects the measured
+    /// preset for that time, unless --quality is given
     #[arg(long, value_parser = duration)]
     pub time: Option<Duration>,
+    /// What the start and the warm-up make in any case, by a preset.
+    #[arg(skip)]
+    pub search: Search,
     /// Re-run the whole program at each step: the same draws, but slow; for testing the
     /// engine
     #[arg(long)]
@@ -137,6 +143,10 @@ pub struct Job {
     /// it
     #[arg(long, value_name = "CMD")]
     pub features_from: Option<String>,
+    /// Write pictures, mask, depth and normals at the size of the photograph, however large
+    /// [default: at most 1600 pixels along the longer side]
+    #[arg(long)]
+    pub full_size: bool,
     /// Seed, chains, steps, time
     #[command(flatten)]
     pub sampling: Sampling,
@@ -151,6 +161,7 @@ impl Job {
             observe_contours: None,
             keypoints: None,
             features_from: None,
+            full_size: false,
             sampling,
         }
     }
@@ -165,6 +176,9 @@ pub struct Run {
     /// The folder for results [default: runs/PROG]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Replace the run in the folder of --out, also that of another program
+    #[arg(long, requires = "out", conflicts_with = "resume")]
+    pub overwrite: bool,
     /// Resume the run that the same command began in this folder, if there is one;
     /// `--steps` and `--time` may be larger than before
     #[arg(long)]

@@ -39,8 +39,10 @@ pub struct Shown {
     pub view: Option<ViewValue>,
     /// Its joints beside those that were found in the photograph.
     pub located: Vec<Located>,
-    /// Its pixels, at the size of the photograph.
+    /// Its pixels.
     pub mask: Option<Mask>,
+    /// The width and height of its mask, depth and normals.
+    pub size: Option<[u32; 2]>,
     /// The fraction of the mesh's vertices that are in the picture.
     pub inside: Option<f64>,
     /// How far the chains' last states cover the same pixels: the number of pixels that
@@ -57,6 +59,7 @@ pub fn show_best(
     best: Option<&BestState>,
     chains: &[ChainResult],
     image: Option<&ImageValue>,
+    full_size: bool,
 ) -> Result<Shown, Failure> {
     let Some(best) = best else { return Ok(Shown::default()) };
     let draws = scene::predictive(seed, 0);
@@ -66,8 +69,14 @@ pub fn show_best(
     let mut shown = Shown::default();
     if let Some(view) = scene::view(&mut trace, draws, None) {
         let located = trace.located();
-        draw(dir, &view, &located, chains, seed, image.and_then(ImageValue::as_photo), &mut shown)?;
-        image.map_or(Ok(()), |image| show_seen(dir, image, &located))?;
+        let photo = image.and_then(ImageValue::as_photo);
+        let most = if full_size { u32::MAX } else { ImageValue::SHOWN };
+        let size = bounded(extent(&view, photo), most);
+        let photo = if full_size { photo } else { image.and_then(ImageValue::shown) };
+        draw(dir, &view, &located, (chains, seed), (photo, size), &mut shown)?;
+        let seen =
+            |image: &ImageValue| show_seen(dir, image, bounded(image.size(), most), &located);
+        image.map_or(Ok(()), seen)?;
         shown.view = Some(ViewValue(view));
         shown.located = located;
     }
@@ -93,20 +102,20 @@ pub fn keep_best(dir: &RunDir, model: &Model, best: &BestSoFar, ending: &Ending,
     }
 }
 
-/// Writes depth, normals, mask and meshes at the resolution of the input, and the
-/// overlay, contours and mask frequency as pictures.
+/// Writes depth, normals, mask and meshes, and the overlay, contours and mask frequency as
+/// pictures, of this size.
 fn draw(
     dir: &RunDir,
     view: &Arc<View>,
     located: &[Located],
-    chains: &[ChainResult],
-    seed: u64,
-    photo: Option<&Photo>,
+    (chains, seed): (&[ChainResult], u64),
+    (photo, (width, height)): (Option<&Photo>, (u32, u32)),
     shown: &mut Shown,
 ) -> Result<(), Failure> {
-    let (camera, (width, height)) = (view.camera(), extent(view, photo));
+    let camera = view.camera();
     let size = width.max(height);
     let frame = view.frame(size);
+    shown.size = Some([frame.width, frame.height]);
     let shape = [frame.height as usize, frame.width as usize];
     write_in(dir, "depth.npy", &npy::f32_array(&shape, frame.depth.iter().copied()))?;
     let normals = npy::f32_array(&[shape[0], shape[1], 3], frame.normal.iter().flatten().copied());
@@ -173,6 +182,13 @@ fn extent(view: &View, photo: Option<&Photo>) -> (u32, u32) {
     photo.map_or((camera.width, camera.height), |p| (p.width(), p.height()))
 }
 
+/// Scales a size down to a longer side of at most `most`.
+fn bounded((width, height): (u32, u32), most: u32) -> (u32, u32) {
+    let scale = (f64::from(most) / f64::from(width.max(height).max(1))).min(1.0);
+    let [width, height] = [width, height].map(|n| (f64::from(n) * scale).round().max(1.0) as u32);
+    (width, height)
+}
+
 /// Returns the pixels that the object covers.
 fn covered(frame: &Frame) -> Option<Mask> {
     Mask::new(frame.width, frame.height, frame.mask().collect()).ok()
@@ -185,7 +201,7 @@ pub fn judged_so_far(job: &Job, ready: &Ready, watched: &Watched) -> Option<Judg
     let (best, draws) = (watched.best.state()?, scene::predictive(0, 0));
     let mut trace = scene::rebuilt(&ready.model, &best.choices, draws).ok()?;
     let view = scene::view(&mut trace, draws, None)?;
-    let (width, height) = extent(&view, ready.photo());
+    let (width, height) = bounded(extent(&view, ready.photo()), ImageValue::SHOWN);
     let object = covered(&view.frame(width.max(height)))?;
     let Some(places) = places else { return people::judged(job, ready, &object) };
     let chains = 0..watched.memories.len();

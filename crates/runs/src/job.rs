@@ -9,33 +9,35 @@ use crate::best::{disagreement, keep_best, outside, show_best, structure_warning
 use crate::embedded::write_scene;
 use crate::failure::{Failure, plain};
 use crate::files::write_in;
+use crate::inputs;
 use crate::inputs::Ready;
 use crate::keypoints::{Joints, coco};
 use crate::people;
 use crate::places::{best_of_each, show_places};
 pub use crate::progress::Interrupt;
 use crate::progress::{self, Ending};
+use crate::record::{
+    counts, identity, record_failure, recorded, write_json, write_record, write_run,
+};
 use crate::reopening::page::write_page;
-use crate::reopening::reopened::{PROGRAM, TRACES, TRAJECTORY, arguments};
-use crate::reopening::{reopened, seen};
+use crate::reopening::reopened::{PROGRAM, TRACES, TRAJECTORY};
+use crate::reopening::seen;
 use crate::stream::Streamed;
 use crate::verdict::{Judgement, Verdict};
 use crate::watched::Watched;
-use crate::{files, inputs};
 use pcadlang_inference::RunOptions;
 use pcadlang_inference::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
-use pcadlang_inference::{
-    BestState, Callback, Callbacks, ChainResult, Evidence, KeptTraces, Trajectory,
-};
+use pcadlang_inference::{Callback, Callbacks, ChainResult, Evidence, KeptTraces, Trajectory};
 use pcadlang_library::scene::ImageValue;
 use pcadlang_library::{Model, Started};
 use pcadlang_report::{
-    ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, bytes_hash, modes, quantities,
-    table, text_hash, widen, zarr,
+    ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, mark_categories, modes,
+    quantities, table, widen, zarr,
 };
 use pcadlang_workbench::bank::BankFiles;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -83,34 +85,13 @@ pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
         if let Some(reason) = q.why_no_r_hat() {
             s["r_hat_reason"] = json!(reason);
         }
+        if let Some(frequent) = q.frequent {
+            s["most_frequent"] = json!(frequent);
+        }
         s["ess_per_second"] = json!(table::per_second(q.summary.ess_bulk, seconds));
         (q.name.clone(), s)
     };
     quantities.iter().map(one).collect()
-}
-
-/// Hashes the files named on the command line, and those that the program reads itself.
-///
-/// # Errors
-/// If a file no longer exists.
-pub fn inputs_hash(job: &Job, model: &Model) -> Result<String, Failure> {
-    let mut all = model.data_hash().to_owned();
-    let named = job
-        .observe
-        .iter()
-        .map(|o| inputs::file_of(o))
-        .chain(job.keypoints.as_deref().map(inputs::file_of));
-    let plain = [&job.observe_contours, &job.inputs.camera].into_iter().flatten();
-    for path in named.map(Path::new).chain(plain.map(|p| p.as_path())) {
-        all.push_str(&bytes_hash(&files::read(path)?));
-    }
-    if job.inputs.edges.is_some() {
-        all.push_str(&bytes_hash(&inputs::detector_bytes(job.inputs.edges.as_deref())?));
-    }
-    if job.inputs.hint.option().is_some() {
-        all.push_str(&bytes_hash(&job.inputs.hint.bytes()?));
-    }
-    Ok(text_hash(&all))
 }
 
 /// Returns the folder of a program.
@@ -136,75 +117,8 @@ pub fn machine_threads() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Makes the record of a run for `run.json` before it begins, with everything that its
-/// draws depend on.
-pub fn record(job: &Job, program_hash: &str, inputs: &str) -> Map<String, Value> {
-    let s = &job.sampling;
-    let record = json!({
-        "version": env!("CARGO_PKG_VERSION"),
-        "state": "running",
-        "begun": reopened::now(),
-        "program": job.inputs.program,
-        "program_hash": program_hash,
-        "inputs_hash": inputs,
-        "seed": s.seed,
-        "arguments": arguments(job),
-        "observe": observed(job).collect::<Vec<_>>(),
-        "set": job.inputs.sets.iter().map(|(k, v)| (k.clone(), json!(v))).collect::<Map<_, _>>(),
-        "settings": {
-            "chains": s.chains(), "steps": s.steps, "warmup": s.warmup,
-            "time": s.time.map(|t| t.as_secs_f64()), "incremental": !s.no_incremental,
-        },
-    });
-    match record {
-        Value::Object(mut record) => {
-            record.extend(job.inputs.edges.iter().map(|e| ("edges".to_owned(), json!(e))));
-            record
-        }
-        _ => Map::new(),
-    }
-}
-
-/// Writes `run.json`: the record, the state, and more fields.
-pub fn write_record(
-    dir: &RunDir,
-    record: &Map<String, Value>,
-    state: &str,
-    more: Value,
-) -> Result<(), Failure> {
-    write_run(dir, &recorded(record, state, more))
-}
-
-/// Adds the state and more fields to a record.
-fn recorded(record: &Map<String, Value>, state: &str, more: Value) -> Value {
-    let mut record = record.clone();
-    record.insert("state".into(), json!(state));
-    if let Value::Object(more) = more {
-        record.extend(more);
-    }
-    Value::Object(record)
-}
-
-fn write_run(dir: &RunDir, run: &Value) -> Result<(), Failure> {
-    write_json(dir, "run.json", run)
-}
-
-fn write_json(dir: &RunDir, name: &str, value: &Value) -> Result<(), Failure> {
-    write_in(dir, name, &serde_json::to_vec_pretty(value).unwrap_or_default())
-}
-
 /// The file of joints in the photograph.
 const KEYPOINTS: &str = "keypoints.json";
-
-/// Records in `run.json` that a run failed, and why.
-pub fn record_failure(
-    dir: &RunDir,
-    record: &Map<String, Value>,
-    failure: &Failure,
-    seconds: f64,
-) -> Result<(), Failure> {
-    write_record(dir, record, "failed", json!({ "error": failure.to_string(), "seconds": seconds }))
-}
 
 /// The default time between checkpoints.
 pub const CHECKPOINT: Duration = Duration::from_secs(10);
@@ -249,6 +163,8 @@ pub fn perform_watched(
     mode: RunMode,
     watched: &Watched,
 ) -> Result<Outcome, Failure> {
+    let source = ("source_hash".to_owned(), json!(ready.model.source_hash()));
+    let record = &record.clone().into_iter().chain([source]).collect();
     write_record(dir, record, "running", json!({}))?;
     write_in(dir, PROGRAM, ready.model.text().as_bytes())?;
     let chains = job.sampling.chains();
@@ -277,6 +193,7 @@ pub fn options(job: &Job, ready: &Ready, callback: Option<Arc<dyn Callback>>) ->
         warmup: s.warmup,
         // The time left after compilation.
         time: s.time.map(|t| t.saturating_sub(ready.begun.elapsed())),
+        search: s.search,
         incremental: !s.no_incremental,
         limits: model.limits().clone(),
         callback,
@@ -391,13 +308,25 @@ impl Fill<'_> {
         let Fill { job, ready, dir, watched, .. } = self;
         let Started { chains, mut warnings, .. } = ran;
         let (seed, image) = (job.sampling.seed, &ready.named_image);
-        let quantities = quantities(draws);
+        let mut quantities = quantities(draws);
+        let last = chains.first().map(|c| &c.last);
+        let categories: HashSet<String> =
+            last.map_or_else(Vec::new, |s| s.categories()).into_iter().collect();
+        mark_categories(&mut quantities, |name| categories.contains(name));
         let kernels = table::merged(chains.iter().map(|c| &c.kernels[..]));
         let modes = modes(&quantities, Some(&self.evidence));
         let places = best_of_each(&modes, &watched.best);
         let best = watched.best.state();
-        let drawn = show_best(dir, seed, &ready.model, best.as_deref(), &chains, ready.image())?;
-        show_places(dir, seed, &ready.model, &places, ready.photo())?;
+        let drawn = show_best(
+            dir,
+            seed,
+            &ready.model,
+            best.as_deref(),
+            &chains,
+            ready.image(),
+            job.full_size,
+        )?;
+        show_places(dir, seed, &ready.model, &places, ready.image().and_then(ImageValue::shown))?;
         let log_joint = best.as_ref().map_or(f64::NAN, |b| b.log_joint);
         write_scene(dir, seed, ready, (log_joint, &drawn), &watched.kept.all())?;
         let places = ready.image().and_then(ImageValue::known_places);
@@ -411,7 +340,6 @@ impl Fill<'_> {
         warnings.extend(people::several(job, ready));
         let named = image.as_ref().map(|(name, _)| name.as_str()).zip(ready.image());
         let sites = SiteStats::total(chains.iter().flat_map(|c| &c.sites));
-        let last = chains.first().map(|c| &c.last);
         warnings.extend(last.and_then(|state| structure_warning(state, &sites)));
         warnings.extend(last.and_then(|state| stuck_warning(state, &sites)));
         let located = last.map_or_else(Vec::new, |state| state.located());
@@ -435,6 +363,7 @@ impl Fill<'_> {
             }
         }
         let mut more = counts(&chains, best.as_deref(), &quantities);
+        more.extend(drawn.size.map(|size| ("size".into(), json!(size))));
         more.extend(drawn.agreement.map(|a| ("agreement".into(), json!(a))));
         more.extend(judged.as_ref().map(|j| ("found".into(), j.json())));
         let outcome = Outcome {
@@ -520,44 +449,6 @@ fn approximate(job: &Job, chains: &[ChainResult]) -> Vec<String> {
     all
 }
 
-/// Returns the statistics of the chains for `run.json`.
-fn counts(
-    chains: &[ChainResult],
-    best: Option<&BestState>,
-    quantities: &[Quantity],
-) -> Map<String, Value> {
-    let each: Vec<Value> = chains
-        .iter()
-        .map(|c| json!({ "steps": c.steps, "warmup": c.warmup, "draws": c.draws, "seconds": c.seconds }))
-        .collect();
-    let best = best.map(|b| b.log_joint);
-    let r_hat =
-        quantities.iter().map(|q| q.summary.r_hat).filter(|r| !r.is_nan()).max_by(f64::total_cmp);
-    // R-hat is undefined if chains are stuck at different values, and the maximum over
-    // other quantities would be misleading.
-    let stuck = quantities.iter().find(|q| q.is_stuck());
-    let r_hat = if stuck.is_some() { None } else { r_hat };
-    let mut all =
-        vec![("chains", json!(each)), ("best_log_joint", json!(best)), ("r_hat_max", json!(r_hat))];
-    if let (None, Some(q)) = (r_hat, stuck.or(quantities.first())) {
-        all.push((
-            "r_hat_max_reason",
-            json!(q.why_no_r_hat().map(|why| format!("{}: {why}", q.name))),
-        ));
-    }
-    all.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
-}
-
-/// Returns a hash of everything that the draws of the chains depend on, which identifies
-/// a run.
-fn identity(record: &Map<String, Value>) -> String {
-    let said = ["program_hash", "inputs_hash", "seed"]
-        .map(|key| record.get(key).cloned().unwrap_or_default());
-    let settings = ["warmup", "incremental"]
-        .map(|key| record.get("settings").and_then(|s| s.get(key)).cloned());
-    text_hash(&json!([said, settings]).to_string())
-}
-
 /// Returns sinks for each chain: its files, and its draws in memory for the summary.
 fn sinks(
     dir: &RunDir,
@@ -587,9 +478,4 @@ fn sinks(
         });
     }
     Ok(sinks)
-}
-
-/// Returns the observations, as arguments of `--observe`.
-fn observed(job: &Job) -> impl Iterator<Item = String> {
-    job.observe.iter().cloned().chain(job.keypoints.iter().map(|k| format!("keypoints={k}")))
 }

@@ -20,6 +20,7 @@ pub mod people;
 pub mod places;
 pub mod progress;
 pub mod quality;
+pub mod record;
 pub mod reopening;
 pub mod resume;
 pub mod scene;

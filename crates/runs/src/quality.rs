@@ -7,7 +7,7 @@
 use crate::args::{Job, QualityArg, Sampling};
 use crate::failure::{Failure, plain};
 use pcadlang_library::shipped;
-use pcadlang_workbench::tradeoff::{Choice, Presets};
+use pcadlang_workbench::tradeoff::{Choice, Presets, Quality};
 use std::path::Path;
 use std::time::Duration;
 
@@ -42,19 +42,9 @@ pub fn apply(job: &mut Job, keypoints: bool) -> Result<Option<String>, Failure> 
         let seconds = job.sampling.time.map_or(0.0, |t| t.as_secs_f64());
         return Ok(presets.of_time(seconds).map(|choice| apply_preset(job, &choice, &name)));
     };
-    let Some((name, presets)) = known else {
-        let hint = "`pcadlang tradeoff` measures settings on cases with ground truth; its option --presets writes the file";
-        return Err(Failure::Plain(
-            format!("{program} has no measured presets"),
-            Some(hint.into()),
-        ));
+    let Some((name, presets)) = known.filter(|(_, p)| fits(p, keypoints)) else {
+        return Ok(Some(apply_time(job, quality)));
     };
-    if !fits(&presets, keypoints) {
-        let needs = presets.needs.join(", ");
-        return Err(plain(format!(
-            "the presets of {program} were measured with {needs}; --quality requires {needs}"
-        )));
-    }
     match presets.of_quality(quality) {
         Some(choice) => Ok(Some(apply_preset(job, &choice, &name))),
         None => Err(plain(format!("{name} contains no presets"))),
@@ -64,6 +54,30 @@ pub fn apply(job: &mut Job, keypoints: bool) -> Result<Option<String>, Failure> 
 /// Returns whether a run has the data that the presets were measured with.
 pub fn fits(presets: &Presets, keypoints: bool) -> bool {
     presets.needs.iter().all(|kind| kind == "keypoints" && keypoints)
+}
+
+/// The time of a run without measured presets.
+fn usual_time(quality: Quality) -> Duration {
+    Duration::from_secs(match quality {
+        Quality::Fast => 10,
+        Quality::Balanced => 30,
+        Quality::Accurate => 120,
+    })
+}
+
+/// Fills in the length of a run for which nothing was measured.
+fn apply_time(job: &mut Job, quality: Quality) -> String {
+    let s = &mut job.sampling;
+    let is_open = s.time.is_none() && s.steps.is_none();
+    s.time = if is_open { Some(usual_time(quality)) } else { s.time };
+    let time = usual_time(quality).as_secs();
+    let said = if is_open { format!("--time {time}s") } else { "no changes".to_owned() };
+    format!(
+        "--quality {}: {said}; nothing was measured for {} as it is run here (pcadlang tradeoff \
+         --presets does)",
+        quality.name(),
+        job.inputs.program
+    )
 }
 
 fn apply_preset(job: &mut Job, choice: &Choice, name: &str) -> String {
@@ -96,6 +110,7 @@ fn apply_preset(job: &mut Job, choice: &Choice, name: &str) -> String {
         s.warmup = Some(warmup);
         said.push(format!("--warmup {warmup}"));
     }
+    s.search = choice.preset.search.unwrap_or_default();
     let [low, high] = choice.preset.interval;
     let (error, cases) = (choice.preset.error, choice.preset.cases);
     format!(
@@ -130,7 +145,6 @@ pub fn again(job: &Job) -> String {
 mod tests {
     use super::*;
     use crate::args::Inputs;
-    use pcadlang_workbench::tradeoff::Quality;
 
     fn job(quality: Option<QualityArg>, time: Option<f64>) -> Job {
         let inputs = Inputs {
@@ -184,9 +198,21 @@ mod tests {
         assert_eq!((told.sampling.steps, told.sampling.warmup), (None, Some(7)));
     }
 
+    /// Programs without measured presets have a time for each quality.
     #[test]
-    fn what_is_not_known_is_an_error_only_if_asked_for() {
-        assert!(apply(&mut job(Some(QualityArg::Known(Quality::Fast)), None), false).is_err());
+    fn what_is_not_measured_has_a_usual_time() {
+        let of = |quality| {
+            let mut open = job(Some(QualityArg::Known(quality)), None);
+            let said = apply(&mut open, false).unwrap().unwrap();
+            assert!(said.contains("nothing was measured"), "{said}");
+            open.sampling.time.unwrap()
+        };
+        let [fast, balanced, accurate] = Quality::ALL.map(of);
+        assert!(fast < balanced && balanced < accurate);
+        let mut told = job(Some(QualityArg::Known(Quality::Fast)), None);
+        told.sampling.steps = Some(7);
+        apply(&mut told, false).unwrap();
+        assert_eq!((told.sampling.steps, told.sampling.time), (Some(7), None));
         assert!(apply(&mut job(None, Some(1.0)), false).unwrap_or_default().is_none());
         assert!(apply(&mut job(Some(QualityArg::Own), None), false).unwrap_or_default().is_none());
     }

@@ -24,6 +24,13 @@ pub fn left(folder: &Path) -> Option<Value> {
     run.get("program_hash").is_some().then_some(run)
 }
 
+/// Returns the program of the run in a folder, if that is another one than `program`, by
+/// their file names.
+pub fn other_program(folder: &Path, program: &str) -> Option<String> {
+    let there = left(folder)?["program"].as_str()?.to_owned();
+    (Path::new(&there).file_name() != Path::new(program).file_name()).then_some(there)
+}
+
 /// Returns the `run.json` of a folder.
 ///
 /// # Errors

@@ -10,9 +10,9 @@ use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::inputs::{self, Ready};
 use pcadlang_runs::job::{self, CHECKPOINT, Interrupt, RunMode};
 use pcadlang_runs::reopening::reopened::Reopened;
-use pcadlang_runs::resume;
 use pcadlang_runs::verdict::sentence;
 use pcadlang_runs::watched::Watched;
+use pcadlang_runs::{record, resume};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -298,8 +298,8 @@ impl Run {
         };
         let watched = Arc::new(Watched::new(job, &ready.model, KEEP));
         let ready = Arc::new(ready);
-        let inputs = job::inputs_hash(job, &ready.model)?;
-        let record = job::record(job, ready.model.hash(), &inputs);
+        let inputs = record::inputs_hash(job, &ready.model)?;
+        let record = record::of(job, ready.model.hash(), &inputs);
         let dir = match resume {
             true => resume::resumed(&self.folder, &record)?,
             false => RunDir::create(&self.folder).map_err(|e| plain(e.to_string()))?,

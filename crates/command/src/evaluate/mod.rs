@@ -16,7 +16,7 @@ use pcadlang_report::{RunDir, bytes_hash, r_hat_text, seconds};
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::job::{CHECKPOINT, Interrupt, RunMode};
 use pcadlang_runs::term;
-use pcadlang_runs::{inputs, job, quality, resume};
+use pcadlang_runs::{inputs, job, quality, record, resume};
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 use std::time::Instant;
@@ -126,7 +126,7 @@ impl<'a> Evaluation<'a> {
             said = quality::apply(&mut job, detections.is_some())?;
             let inputs =
                 bytes_hash(&[observed::bytes(&case, detections.as_ref()), same.clone()].concat());
-            let record = job::record(&job, &hash, &inputs);
+            let record = record::of(&job, &hash, &inputs);
             let chosen = a.only.is_empty() || a.only.contains(&case.name);
             Ok(Task { case, job, record, chosen, row: None })
         };
@@ -225,7 +225,7 @@ impl<'a> Evaluation<'a> {
         let begun = Instant::now();
         let ready = inputs::prepare(&t.job, true).inspect_err(|failure| {
             // An error in writing the record must not hide the first error.
-            let _ = job::record_failure(&dir, &t.record, failure, begun.elapsed().as_secs_f64());
+            let _ = record::record_failure(&dir, &t.record, failure, begun.elapsed().as_secs_f64());
         })?;
         let live = !(self.a.quiet || self.a.json);
         let mode = RunMode {

@@ -57,6 +57,7 @@ pub fn calibrate(a: &Check) -> Result<(), Failure> {
 fn job(a: &Check, path: &str) -> Job {
     Job {
         features_from: None,
+        full_size: false,
         inputs: Inputs {
             program: path.to_owned(),
             sets: a.sets.clone(),
@@ -101,6 +102,7 @@ fn run<T>(
         threads: a.threads.map_or_else(machine_threads, |n| n as usize),
         steps: a.steps,
         limits: model.limits().clone(),
+        estimated: Some(|time| error_line!("this takes about {}", seconds(time.as_secs_f64()))),
     };
     let (progress, ending) = (Arc::new(Progress::default()), Ending::default());
     interrupt.ends(&progress);

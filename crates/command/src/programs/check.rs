@@ -20,7 +20,11 @@ pub fn check(a: &Check) -> Result<(), Failure> {
         };
         let interface = program.interface();
         match program.without_data().compile() {
-            Ok(_) => {
+            Ok(model) => {
+                let (sources, warnings) = model.warnings();
+                if !warnings.is_empty() {
+                    error_text!("{}", render(sources, warnings, has_colors()));
+                }
                 print_line!("{path}: no mistakes found");
                 for p in interface.params {
                     let (default, help) =

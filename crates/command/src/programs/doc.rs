@@ -5,6 +5,7 @@ use pcadlang_engine::lang::builtins::search::search;
 use pcadlang_engine::lang::builtins::{Table, doc as docs};
 use pcadlang_library::standard;
 use pcadlang_runs::failure::{Failure, plain};
+use pcadlang_syntax::elsewhere::called_here;
 
 /// Prints documentation from the table of built-ins.
 pub fn doc(a: &Doc) -> Result<(), Failure> {
@@ -24,9 +25,11 @@ pub fn doc(a: &Doc) -> Result<(), Failure> {
         None => {
             let names: Vec<String> = table.iter().map(|b| b.full_name()).collect();
             let near = pcadlang_syntax::diag::nearest(name, names.iter().map(String::as_str));
+            let here = called_here(name).map(|here| format!("write `{here}`"));
+            let near = here.or_else(|| near.map(|n| format!("did you mean `{n}`?")));
             let search =
                 || format!("`pcadlang doc --search {name}` also searches the descriptions");
-            let hint = near.map_or_else(search, |n| format!("did you mean `{n}`?"));
+            let hint = near.unwrap_or_else(search);
             match name.as_str() {
                 "" => Err(plain("a name is needed")),
                 _ => Err(Failure::Plain(format!("there is no built-in `{name}`"), Some(hint))),

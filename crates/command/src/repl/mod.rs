@@ -75,6 +75,7 @@ fn job(a: &Repl, path: &str) -> Job {
             allowed: a.allowed.clone(),
             hint: Default::default(),
         },
+        full_size: false,
         observe: a.observe.clone(),
         observe_contours: None,
         keypoints: a.keypoints.clone(),

@@ -104,6 +104,7 @@ fn job(a: &Tradeoff, Task { setting, case, seed }: Task, threads: u32) -> Job {
         steps: setting.steps,
         warmup: setting.warmup,
         time: setting.time.map(Duration::from_secs_f64),
+        search: Default::default(),
         no_incremental: false,
     };
     Job { observe: case.observe.clone(), ..Job::of(inputs, sampling) }

@@ -21,6 +21,27 @@ pub struct Plan {
     pub freezes: Arc<[Selection]>,
 }
 
+impl Plan {
+    /// The columns that its `collect` statements name, each once; `None` if it has no such
+    /// statement.
+    pub fn collected(&self) -> Option<Vec<(String, Operand)>> {
+        fn gather(steps: &[Step], all: &mut Option<Vec<(String, Operand)>>) {
+            for step in steps {
+                if let StepKind::Collect(columns) = &step.kind {
+                    let all = all.get_or_insert_default();
+                    let new = columns.iter().filter(|(n, _)| !all.iter().any(|(m, _)| m == n));
+                    let new: Vec<_> = new.cloned().collect();
+                    all.extend(new);
+                }
+                gather(step.body(), all);
+            }
+        }
+        let mut all = None;
+        gather(&self.steps, &mut all);
+        all
+    }
+}
+
 /// A kernel that the program declares.
 #[derive(Clone, Debug)]
 pub struct DeclaredKernel {

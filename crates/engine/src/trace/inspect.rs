@@ -143,6 +143,16 @@ impl Trace {
         self.all_targets().len()
     }
 
+    /// Returns the addresses, without their `@`, of the choices that are numbers of categories.
+    #[doc(hidden)]
+    pub fn categories(&self) -> Vec<String> {
+        let is = |t: &&Target| {
+            matches!(self.dist(**t), Some(Dist::Categorical(_) | Dist::CategoricalLogits(_)))
+        };
+        let all = self.all_targets().iter().filter(is);
+        all.map(|t| self.address(*t).to_string().split_off(1)).collect()
+    }
+
     /// True if the state has observations or factors; otherwise draws are those of the prior.
     #[doc(hidden)]
     pub fn is_conditioned(&self) -> bool {

@@ -54,6 +54,7 @@ use graph::Graph;
 use journal::Before;
 pub use marginal::{Elimination, Explored, Marginal, Tabulated, Tabulation};
 use node::{FrameId, NONE};
+use pcadlang_numerics::dist::Datum;
 use std::sync::Arc;
 
 /// One execution of a program: the values of its choices and everything computed from
@@ -192,6 +193,30 @@ impl Trace {
         let propagated = self.graph.propagate(&self.code);
         self.graph.update.constraints.clear();
         self.pend(before, propagated)
+    }
+
+    /// Sets a choice once more within the pending proposal, and returns the weight of both
+    /// changes together: what differs from the pending proposal is computed, not from the state
+    /// before it. `None`, with the proposal as it was, if it has changed which choices there are
+    /// or drawn any.
+    ///
+    /// # Errors
+    /// If the program fails under the value; the trace is then as before the proposal.
+    pub fn propose_further(
+        &mut self,
+        target: Target,
+        value: Datum,
+        draws: Draws,
+    ) -> Option<TraceResult<Weight>> {
+        let before = self.update.take_if(|_| self.graph.update.is_fixed())?;
+        if self.graph.update.renew() {
+            self.graph.store.forget_changes();
+        }
+        self.graph.update.draws = draws;
+        let change = [(target, Change::Set(value))];
+        self.graph.update.queue(&mut self.graph.store, &self.code, &change);
+        let propagated = self.graph.propagate(&self.code);
+        Some(self.pend(before, propagated))
     }
 
     /// Leaves a successful update pending, and undoes one that failed.

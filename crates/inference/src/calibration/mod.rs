@@ -22,6 +22,7 @@ pub use sbc::{RANKS, Sbc, SbcRow, sbc};
 use super::parallel::in_parallel;
 use super::run::ChainError;
 use pcadlang_engine::trace::Limits;
+use std::time::Duration;
 
 /// The probability that a correct sampler fails a check, over all quantities together
 /// (Bonferroni).
@@ -45,11 +46,20 @@ pub struct Settings {
     pub steps: Option<u64>,
     /// Limits on what the program may build.
     pub limits: Limits,
+    /// Called by `sbc` with the time that the rest takes, estimated from a few pilot chains.
+    pub estimated: Option<fn(Duration)>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { replicates: 200, seed: 1, threads: 1, steps: None, limits: Limits::default() }
+        Settings {
+            replicates: 200,
+            seed: 1,
+            threads: 1,
+            steps: None,
+            limits: Limits::default(),
+            estimated: None,
+        }
     }
 }
 

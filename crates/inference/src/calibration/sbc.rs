@@ -15,6 +15,7 @@ use crate::diagnostics::ess_bulk;
 use pcadlang_engine::lang::code::Code;
 use pcadlang_engine::trace::{Draws, Trace};
 use pcadlang_numerics::num::chi_square_tail;
+use pcadlang_numerics::platform::clock::Instant;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The number of possible ranks of a true value: one more than the draws kept.
@@ -102,16 +103,20 @@ pub fn sbc(
             std::mem::take(&mut *callback.rows.lock().unwrap_or_else(PoisonError::into_inner));
         ranked(truth, &rows, settings, i).map(|ranks| (steps, ranks))
     };
+    let begun = Instant::now();
     let mut done = each(settings, 0..count.min(PILOTS), |i| one(i, settings.steps))?;
+    let mut each_takes = begun.elapsed() / done.len().max(1) as u32;
     let least = done.iter().flat_map(|(_, r)| r).map(|r| r.ess).fold(f64::INFINITY, f64::min);
     let wanted = 2.0 * RANKS as f64;
     let mut steps = settings.steps;
     if steps.is_none() && least < wanted {
         let longer = (1.5 * wanted / least).clamp(1.0, LONGEST);
+        each_takes = each_takes.mul_f64(longer);
         steps = done.iter().map(|(s, _)| (*s as f64 * longer) as u64).max();
         done.clear();
     }
     let first = done.len() as u32;
+    settings.estimated.iter().for_each(|tell| tell(each_takes * (count - first)));
     done.extend(each(settings, first..count, |i| one(i, steps))?);
     Ok(judged(&quantities, &done))
 }

@@ -38,6 +38,9 @@ pub struct Gibbs {
     values: Vec<Datum>,
     log: Vec<f64>,
     weights: Vec<f64>,
+    /// True once a value was met that changes the set of choices: each is then proposed from
+    /// the present state.
+    apart: bool,
 }
 
 /// Properties of the weighed values of a choice.
@@ -54,7 +57,8 @@ impl Gibbs {
     /// A kernel for one of these choices at a time.
     pub fn new(scope: SiteSelection) -> Self {
         let scope = Registered::new(scope.single());
-        Gibbs { scope, values: Vec::new(), log: Vec::new(), weights: Vec::new() }
+        let (values, log, weights) = Default::default();
+        Gibbs { scope, values, log, weights, apart: false }
     }
 
     /// Computes the log weights of all values, relative to the state with value `old`,
@@ -73,6 +77,46 @@ impl Gibbs {
         trace
             .weigh_values(target, dist, (&self.values, old), at.power, number)
             .then(Weighed::default)
+    }
+
+    /// As [`Gibbs::weigh_beside`], by updates from each value to the next, upwards and downwards
+    /// from the present one: of a change point, only the terms between the two are computed.
+    /// `None` if a value fails or changes the set of choices.
+    fn walk(
+        &mut self,
+        trace: &mut Trace,
+        at: &StepContext,
+        target: Target,
+        old: usize,
+    ) -> TraceResult<Option<Weighed>> {
+        let mut weighed = Weighed::default();
+        self.log.clear();
+        self.log.resize(self.values.len(), 0.0);
+        let upwards = old + 1..self.values.len();
+        for (i, first) in upwards.map(|i| (i, old + 1)).chain((0..old).rev().map(|i| (i, old - 1)))
+        {
+            let (value, draws) = (self.values[i].clone(), at.draws(i as u64));
+            let moved = match i == first {
+                true => trace.propose(&[(target, Change::Set(value))], draws),
+                false => match trace.propose_further(target, value, draws) {
+                    Some(moved) => moved,
+                    None => return Ok(None),
+                },
+            };
+            match recoverable(moved)? {
+                Some(w) if w.appeared == 0 && w.vanished == 0 => {
+                    let log = at.tempered(&w);
+                    self.log[i] = if log.is_nan() { f64::NEG_INFINITY } else { log };
+                    weighed.pending = Some(i);
+                }
+                Some(_) => {
+                    self.apart = true;
+                    return Ok(None);
+                }
+                None => return Ok(None),
+            }
+        }
+        Ok(Some(weighed))
     }
 
     /// As [`Gibbs::weigh_beside`], by updates. `ways` is minus the log probability of
@@ -136,7 +180,13 @@ impl Kernel for Gibbs {
         };
         let forward = match self.weigh_beside(trace, at, target, &dist, old) {
             Some(forward) => forward,
-            None => self.weigh(trace, at, target, old, (libm::log(n as f64), 0))?,
+            None => {
+                let walks = self.values.len() > 2 && !self.apart;
+                match if walks { self.walk(trace, at, target, old)? } else { None } {
+                    Some(forward) => forward,
+                    None => self.weigh(trace, at, target, old, (libm::log(n as f64), 0))?,
+                }
+            }
         };
         let chosen = sample_log(&self.log, &mut self.weights, &mut rng);
         let other = |(i, l): (usize, &f64)| i != old && *l > f64::NEG_INFINITY;
@@ -223,6 +273,47 @@ mod tests {
                 moves += moved;
             }
             assert!((1..200).contains(&moves), "{text}: {moves}");
+        }
+    }
+
+    /// Weights by a walk over the values are those of each value by itself, to the last bit, also
+    /// where values are impossible, and where the state is.
+    #[test]
+    fn a_walk_gives_the_weights_of_single_updates() {
+        let rates = "for i in 0 .. 30 { observe poisson(if i < t { a } else { b }) = y[i] as y; }";
+        let map = "let r = map(fn(i) { if t > i { a } else { b } }, 0 .. 30);
+            for i in 0 .. 30 { observe poisson(r[i]) = y[i] as y; }";
+        let other = "for i in 0 .. 30 { observe poisson(if i <= 0.5 * t or t == 7 { a } else { b }) = y[i] as y; }
+            observe normal(t + a + b, 3) = 9;";
+        let edge = "for i in 0 .. 30 { observe poisson(if i < t { a } else { b }) = y[i] as y; }
+            observe uniform(0, t) = 5;";
+        for body in [rates, map, other, edge] {
+            let text = format!(
+                "let y = map(fn(i) {{ (i * 7) % 5 }}, 0 .. 30); assume a ~ gamma(2, 1); assume b ~ gamma(2, 1);
+                 assume t ~ uniform_discrete(1, 29); {body}"
+            );
+            let mut trace = crate::testing::trace(&text, 1);
+            let selector = Selector::Kind(ChoiceKind::Finite);
+            let selection = trace.select(&selector);
+            let t = trace.targets(selection)[0];
+            let mut kernel = Gibbs::new(SiteSelection { selector, pick: Pick::One });
+            assert!(trace.dist(t).unwrap().support().list_values(&mut kernel.values));
+            let mut moved = 0;
+            for step in 0..40 {
+                let at = StepContext::new(1, 0, step);
+                let stored = trace.stored(t);
+                let old = kernel.values.iter().position(|v| Some(v) == stored.as_ref()).unwrap();
+                kernel.walk(&mut trace, &at, t, old).unwrap().unwrap();
+                let walked = kernel.log.clone();
+                kernel.weigh(&mut trace, &at, t, old, (0.0, 0)).unwrap();
+                let bits = |log: &[f64]| log.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+                assert_eq!(bits(&walked), bits(&kernel.log), "{body}, step {step}");
+                trace.rollback();
+                let before = trace.log_joint();
+                kernel.step(&mut trace, &at).unwrap();
+                moved += u32::from(trace.log_joint() != before);
+            }
+            assert!(moved > 5, "{body}: {moved}");
         }
     }
 }

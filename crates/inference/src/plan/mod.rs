@@ -24,6 +24,7 @@ pub(crate) use start::SharedStart;
 use start::start_of;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 /// Runs one chain of a plan, or resumes it from the checkpoint of its sink. Chains share
 /// how they start.
@@ -48,7 +49,8 @@ pub(crate) fn run_chain(
     }
     let (how, from, forced) = shared.get(|| start_of(code, plan, options))?;
     // Under a time limit a quarter of it is for the start, as much as that leaves to warm-up.
-    let how = Start { within: options.time.map(|t| t / 4), ..how };
+    let within = options.time.filter(|_| options.warmup.is_none()).map(|t| t / 4);
+    let how = Start { within, least: options.search.draws, ..how };
     check(code, &plan.steps, options)?;
     let (seeded, limits) = ((options.seed, chain), &options.limits);
     let start = |forced| starts_from(code, seeded, how, (from.as_ref(), forced), limits.clone());
@@ -102,11 +104,17 @@ fn check(code: &Code, steps: &[Step], options: &RunOptions) -> Result<(), Box<Ru
     Ok(())
 }
 
+/// The time limit in which evaluations must end from the beginning of a chain on. If the start
+/// and the warm-up are made whatever time they take, only what follows is limited.
+fn search_time(options: &RunOptions) -> Option<Duration> {
+    options.time.filter(|_| options.warmup.is_none() && options.search.warmup == 0)
+}
+
 /// The options of a chain, with limits by which it can also be stopped in the middle of
 /// an evaluation.
 fn stoppable(options: &RunOptions, progress: &Progress) -> RunOptions {
-    let stop =
-        options.limits.stop.clone().or(Arc::clone(&progress.cancelled)).or_within(options.time);
+    let stop = options.limits.stop.clone().or(Arc::clone(&progress.cancelled));
+    let stop = stop.or_within(search_time(options));
     RunOptions { limits: Limits { stop, ..options.limits.clone() }, ..options.clone() }
 }
 

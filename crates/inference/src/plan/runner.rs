@@ -160,7 +160,9 @@ impl<'a> Runner<'a> {
             }
             self.finished = flow != Flow::End;
             if self.draws == 0 {
-                self.record(None)?;
+                // What `collect` would have recorded, so that all chains have the same columns.
+                let collected = self.plan.collected();
+                self.record(collected.as_deref())?;
             }
             if self.finished {
                 self.keep(None)?;
@@ -417,7 +419,10 @@ impl<'a> Runner<'a> {
             self.progress.pass.store(i, Ordering::Relaxed);
             self.progress.passes.store(of, Ordering::Relaxed);
         }
-        if self.resume_path.is_empty() && self.is_over() {
+        // However late it is, a warm-up and what follows make a step each: a state that has not
+        // moved would be a draw from the prior.
+        let is_first = i == 0 && self.used() == 0;
+        if self.resume_path.is_empty() && (self.is_done() || self.is_late() && !is_first) {
             self.keep(None)?;
             return Ok(Flow::End);
         }
@@ -446,15 +451,26 @@ impl<'a> Runner<'a> {
 
     /// True if the run, or its warm-up, has used up its steps or time.
     pub fn is_over(&self) -> bool {
-        if self.is_cancelled() {
-            return true;
-        }
-        let used = self.step - self.warmup_steps;
+        self.is_done() || self.is_late()
+    }
+
+    /// The steps of the warm-up, or of what follows it.
+    fn used(&self) -> u64 {
+        self.step - self.warmup_steps
+    }
+
+    /// True if the run is cancelled, or it or its warm-up has made its steps.
+    fn is_done(&self) -> bool {
         let bound = if self.in_warmup { self.options.warmup } else { self.options.steps };
-        if bound.is_some_and(|n| used >= n) {
-            return true;
-        }
+        self.is_cancelled() || bound.is_some_and(|n| self.used() >= n)
+    }
+
+    /// True if the run, or its warm-up, has used up its time. A warm-up whose steps are given
+    /// makes all of them, and any makes those of a search.
+    fn is_late(&self) -> bool {
+        let searches = self.options.warmup.is_some() || self.used() < self.options.search.warmup;
         match self.options.time {
+            Some(_) if self.in_warmup && searches => false,
             Some(t) => self.started.elapsed() >= if self.in_warmup { t / 2 } else { t },
             None => false,
         }

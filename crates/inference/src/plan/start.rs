@@ -77,7 +77,7 @@ pub(super) fn start_of(
     let keep = keep.as_ref().map_or(Ok(1), |f| count(f, &mut env))?;
     let from = from.as_ref().map(|call| own(plan, call, &mut env)).transpose()?;
     let keep = keep.min(draws) as usize;
-    Ok((Start { draws, keep, by: By::Best, within: None }, from, forced))
+    Ok((Start { draws, keep, by: By::Best, ..Start::default() }, from, forced))
 }
 
 fn count(f: &Formula, env: &mut PlanEnv) -> Result<u64, Box<RunError>> {

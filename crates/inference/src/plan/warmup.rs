@@ -3,10 +3,12 @@
 
 use super::place::ResumePoint;
 use super::runner::{Flow, Runner};
+use super::search_time;
 use crate::calls::error::fail;
 use crate::run::ChainError;
 use pcadlang_engine::lang::plan::{Formula, Step};
 use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::trace::Limits;
 use pcadlang_numerics::rng::{Purpose, Stream, StreamKey};
 use pcadlang_syntax::span::Span;
 use std::sync::atomic::Ordering;
@@ -38,6 +40,12 @@ impl<'a> Runner<'a> {
         self.progress.warming.fetch_sub(1, Ordering::Relaxed);
         self.power = 1.0;
         self.warmup_steps = self.step;
+        if let (None, Some(time)) = (search_time(self.options), self.options.time) {
+            let left = time.saturating_sub(self.started.elapsed());
+            let limits = self.trace.limits().clone();
+            let stop = limits.stop.clone().or_within(Some(left));
+            self.trace.set_limits(Limits { stop, ..limits });
+        }
         Ok(if flow == Flow::End && self.is_cancelled() { Flow::End } else { Flow::Next })
     }
 
@@ -66,7 +74,13 @@ impl<'a> Runner<'a> {
             (Some(n), _) => self.step as f64 / (n.max(1) as f64),
             (None, Some(t)) => {
                 let clock = self.started.elapsed().as_secs_f64() / (t.as_secs_f64() / 2.0);
-                clock.max(passed)
+                // While less than a search is made, it follows the steps if the clock is ahead.
+                let least = self.options.search.warmup.max(1) as f64;
+                passed.max(if self.step as f64 > least {
+                    clock
+                } else {
+                    clock.min(self.step as f64 / least)
+                })
             }
             (None, None) => passed,
         };

@@ -319,10 +319,20 @@ impl Program {
         match compile(&self.loaded, inputs, &mut self.sources) {
             Ok(compiled) => {
                 let hash = hash_of(&self.loaded, &self.sources, &self.sets);
+                let source_hash = hash_of(&self.loaded, &self.sources, &[]);
                 let (reach, limits, data_hash) = (self.reach, self.limits, data_hash.into_inner());
                 let (sources, text, default_plan) = (self.sources, self.text, OnceLock::new());
-                let model =
-                    Model { compiled, sources, text, hash, data_hash, reach, limits, default_plan };
+                let model = Model {
+                    compiled,
+                    sources,
+                    text,
+                    hash,
+                    source_hash,
+                    data_hash,
+                    reach,
+                    limits,
+                    default_plan,
+                };
                 model.uses_no_missing_entry().map(|()| model)
             }
             Err(diagnostics) => Err(Error { diagnostics, sources: self.sources }),
@@ -359,7 +369,7 @@ fn widened(reach: Reach, folder: &Path, sources: &SourceMap) -> Result<Reach, Er
 }
 
 /// Hashes all source texts and settings of a program, to check that a saved trace belongs
-/// to it.
+/// to it; without settings, its source alone.
 fn hash_of(loaded: &Loaded, sources: &SourceMap, sets: &[(String, String)]) -> String {
     let mut all = String::new();
     for u in &loaded.units {

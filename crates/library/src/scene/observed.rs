@@ -96,6 +96,8 @@ pub struct ImageValue {
 #[derive(Debug, Default)]
 struct Picture {
     photo: Option<Photo>,
+    /// The photograph at a size to look at, if it is larger.
+    shown: OnceLock<Photo>,
     /// Its contours, given or detected on first use.
     map: OnceLock<Result<ContourMap, Fault>>,
     /// The contours were given.
@@ -113,6 +115,10 @@ impl ImageValue {
     /// few more edges help where the object is dim
     /// (docs/measurements/objects.md).
     pub(super) const STRONG: f32 = 0.4;
+
+    /// The longer side of pictures to look at in pixels: more show no more of a scene that is
+    /// compared at a few hundred.
+    pub const SHOWN: u32 = 1600;
 
     /// Creates an image of a photograph; its contours are detected when they are needed.
     pub fn photo(photo: Photo) -> Self {
@@ -142,6 +148,16 @@ impl ImageValue {
     /// Returns the photograph.
     pub fn as_photo(&self) -> Option<&Photo> {
         self.picture.photo.as_ref()
+    }
+
+    /// Returns the photograph for looking at: shrunk, once, to a longer side of
+    /// [`SHOWN`](Self::SHOWN) pixels if it is larger.
+    pub fn shown(&self) -> Option<&Photo> {
+        let photo = self.as_photo()?;
+        match photo.width().max(photo.height()) > Self::SHOWN {
+            true => Some(self.picture.shown.get_or_init(|| photo.shrunk(Self::SHOWN))),
+            false => Some(photo),
+        }
     }
 
     /// Returns what was prepared from the picture.

@@ -58,7 +58,13 @@ mod tests {
     use pcadlang_inference::diagnostics::summary;
 
     fn steps(chains: Vec<Vec<f64>>) -> (Value, Vec<Vec<u16>>) {
-        let q = Quantity { name: "x".into(), column: None, summary: summary(&chains), chains };
+        let q = Quantity {
+            name: "x".into(),
+            column: None,
+            summary: summary(&chains),
+            chains,
+            frequent: None,
+        };
         let all = data(&[q]);
         let chains = all["quantities"][0]["chains"].as_array().unwrap();
         let read = |chain: &Value| {

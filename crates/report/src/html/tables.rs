@@ -28,8 +28,11 @@ pub(super) fn quantities(quantities: &[Quantity]) -> String {
             true => _ = write!(s, "<tr><th><a href=\"#q{i}\">{name}</a>"),
             false => _ = write!(s, "<tr><th>{name}"),
         }
-        let _ = write!(s, "<td>{}<td>{}<td{class}>{r_hat}", number(m.mean), number(m.sd));
-        for x in [m.q05, m.q50, m.q95, m.ess_bulk.round(), m.ess_tail.round(), m.mcse_mean] {
+        let known = |x: f64| if q.frequent.is_some() { f64::NAN } else { x };
+        let mean = q.frequent.map_or_else(|| number(m.mean), |f| f.to_string());
+        let _ = write!(s, "<td>{mean}<td>{}<td{class}>{r_hat}", number(known(m.sd)));
+        let [low, median, high, error] = [m.q05, m.q50, m.q95, m.mcse_mean].map(known);
+        for x in [low, median, high, m.ess_bulk.round(), m.ess_tail.round(), error] {
             let _ = write!(s, "<td>{}", number(x));
         }
         s.push_str("</tr>\n");

@@ -7,7 +7,7 @@ use crate::places::sized;
 use crate::reopening::reopened::quoted;
 use crate::{files, resume};
 use pcadlang_report::pictures::{contact_sheet, png};
-use pcadlang_report::{number, table};
+use pcadlang_report::{Frequent, number, table};
 use serde_json::Value;
 use std::path::Path;
 
@@ -41,13 +41,11 @@ impl RunSummary {
 
     /// Returns the program, and the options with their values.
     fn settings(&self) -> Vec<String> {
-        let (mut all, mut arguments) = (Vec::new(), self.arguments().into_iter());
+        let (mut all, mut arguments) = (Vec::new(), self.arguments().into_iter().peekable());
         while let Some(a) = arguments.next() {
-            all.push(if a.starts_with("--") {
-                format!("{a} {}", arguments.next().unwrap_or_default())
-            } else {
-                a
-            });
+            // Some options have no value.
+            let value = arguments.next_if(|v| a.starts_with("--") && !v.starts_with("--"));
+            all.push(value.map_or(a.clone(), |value| format!("{a} {value}")));
         }
         all
     }
@@ -94,8 +92,11 @@ impl Comparison {
         [only(&left, &right), only(&right, &left)]
     }
 
-    /// Returns whether both runs have the same value in a field of `run.json`.
+    /// Returns whether both runs have the same value in a field of `run.json`. Programs are
+    /// the same whatever their settings, which are compared apart.
     pub fn has_same(&self, field: &str) -> bool {
+        let known = self.runs.iter().all(|r| !r.run["source_hash"].is_null());
+        let field = if field == "program_hash" && known { "source_hash" } else { field };
         self.runs[0].run[field] == self.runs[1].run[field]
     }
 
@@ -135,6 +136,9 @@ pub fn compare(a: &Compare) -> Result<(), Failure> {
         (true, true, true) => print_line!("\nThe commands, programs and data are the same."),
         (_, program, data) => {
             print_line!("\nonly A: {}\nonly B: {}", said(&left), said(&right));
+            if program && data {
+                print_line!("only settings differ: the programs and data are the same");
+            }
             if !program {
                 print_line!("the programs differ");
             }
@@ -155,8 +159,20 @@ fn quantities(compared: &Comparison) -> String {
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for QuantityDifference { name, a, b, difference } in both.iter().take(LISTED) {
         let of = |summary: &Value, what: &str| number(summary[what].as_f64().unwrap_or(f64::NAN));
-        let mut row = vec![name.clone(), of(a, "mean"), of(a, "sd"), of(b, "mean"), of(b, "sd")];
-        row.extend([number(*difference), of(a, "r_hat"), of(b, "r_hat")]);
+        // The numbers of categories have no mean.
+        let frequent = |summary: &Value| {
+            let f = &summary["most_frequent"];
+            Some(Frequent { value: f["value"].as_f64()?, share: f["share"].as_f64()? }.to_string())
+        };
+        let [left, right] = [a, b].map(|s| match frequent(s) {
+            Some(frequent) => [frequent, "-".into()],
+            None => [of(s, "mean"), of(s, "sd")],
+        });
+        let is_category = frequent(a).is_some() || frequent(b).is_some();
+        let apart = if is_category { "-".into() } else { number(*difference) };
+        let mut row = vec![name.clone()];
+        row.extend(left.into_iter().chain(right));
+        row.extend([apart, of(a, "r_hat"), of(b, "r_hat")]);
         rows.push(row);
     }
     let mut text = table::aligned(&rows);

@@ -14,7 +14,7 @@ use pcadlang_inference::draws::KernelStats;
 use pcadlang_report::html::{Figure, Page, page};
 use pcadlang_report::pictures::{jpeg, png};
 use pcadlang_report::{
-    Mode, Quantity, RunDir, modes, quantities, rename, reread, seconds, warnings,
+    Mode, Quantity, RunDir, mark_categories, modes, quantities, rename, reread, seconds, warnings,
 };
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
@@ -221,6 +221,8 @@ pub fn written(a: &Report) -> Result<PathBuf, Failure> {
     let names: Vec<&String> =
         summary["quantities"].as_object().into_iter().flat_map(|q| q.keys()).collect();
     rename(&mut quantities, names.into_iter().map(String::as_str));
+    let known = &summary["quantities"];
+    mark_categories(&mut quantities, |name| known[name]["most_frequent"].is_object());
     write_page(&dir, &run, &summary, &quantities)?;
     Ok(dir.file(PAGE))
 }

@@ -62,6 +62,7 @@ pub fn arguments(job: &Job) -> Vec<String> {
     s.time.iter().for_each(|t| add("time", format!("{}ms", t.as_millis())));
     add("quality", "own".into());
     all.extend(g.who.anyway.then(|| "--anyway".to_owned()));
+    all.extend(job.full_size.then(|| "--full-size".to_owned()));
     all.extend(g.hint.arguments());
     all
 }

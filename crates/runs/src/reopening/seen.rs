@@ -19,14 +19,18 @@ const QUALITY: u8 = 90;
 /// The margin around the joints, as a fraction of their extent.
 const MARGIN: f64 = 0.15;
 
-/// Writes `photo.jpg`, its contours as `photo_contours.png`, and `joints.png` if any were
+/// Writes, for a picture of this size, `photo.jpg`, its contours as `photo_contours.png`, and `joints.png` if any were
 /// detected.
-pub fn show_seen(dir: &RunDir, image: &ImageValue, located: &[Located]) -> Result<(), Failure> {
-    let (width, height) = image.size();
+pub fn show_seen(
+    dir: &RunDir,
+    image: &ImageValue,
+    (width, height): (u32, u32),
+    located: &[Located],
+) -> Result<(), Failure> {
     let told = |e: image::ImageError| plain(e.to_string());
-    if let Some(photo) = image.as_photo() {
+    if let (Some(photo), Some(shown)) = (image.as_photo(), image.shown()) {
         let (w, h) = pictures::picture_size(width, height);
-        let small = sized(photo.rgb(), w.max(h).min(LARGEST));
+        let small = sized(shown.rgb(), w.max(h).min(LARGEST));
         let bytes = jpeg(&small, QUALITY).map_err(told)?;
         write_in(dir, "photo.jpg", &bytes)?;
         if let Some(joints) = joints(photo.rgb(), located) {

@@ -77,7 +77,10 @@ impl Analysis {
             }
         };
         let (model, diagnostics) = match compiled {
-            Ok(model) => (Some(model), Vec::new()),
+            Ok(model) => {
+                let warnings = model.warnings().1.to_vec();
+                (Some(model), warnings)
+            }
             Err(e) => (None, e.diagnostics),
         };
         Analysis { sources, diagnostics, names, model, program, builtins: standard::table() }

@@ -6,10 +6,12 @@ mod analysis;
 mod completion;
 mod names;
 mod resolve;
+mod signature;
 mod symbols;
 pub mod words;
 
 pub use analysis::{Analysis, CannotRename};
 pub use completion::{Candidate, CandidateKind};
 pub use names::{Binding, BindingId, BindingKind, Names, Occurrence};
+pub use signature::Signature;
 pub use symbols::{Hint, Piece, PieceKind};

@@ -56,21 +56,31 @@ pub fn open_string(before: &str) -> Option<usize> {
 
 /// Returns the name of the call whose arguments are open at the end of a text.
 pub fn enclosing_call(before: &str) -> Option<String> {
-    let hidden: Vec<_> = classes(before)
-        .into_iter()
-        .filter(|(_, c)| matches!(c, Class::String | Class::Comment | Class::Address))
-        .collect();
+    open_call(before).map(|(name, _)| name)
+}
+
+/// Returns the characters of a text, with their places, that are not in strings, comments or
+/// addresses.
+fn code(text: &str) -> impl DoubleEndedIterator<Item = (usize, char)> {
+    let is_code = |c: &Class| !matches!(c, Class::String | Class::Comment | Class::Address);
+    let hidden: Vec<_> = classes(text).into_iter().filter(|(_, c)| !is_code(c)).collect();
+    text.char_indices().filter(move |(i, _)| hidden.iter().all(|(r, _)| !r.contains(i)))
+}
+
+/// Returns the name of the call whose arguments are open at the end of a text, and where they
+/// begin.
+pub fn open_call(before: &str) -> Option<(String, usize)> {
     let mut depth = 0;
-    for (i, c) in before.char_indices().rev() {
-        if hidden.iter().any(|(r, _)| r.contains(&i)) {
-            continue;
-        }
+    for (i, c) in code(before).rev() {
         match c {
             ')' | ']' | '}' => depth += 1,
             '(' if depth == 0 => {
                 let head = before[..i].trim_end();
                 let start = start_of(head, |c| c.is_alphanumeric() || c == '_' || c == '.');
-                return Some(head[start..].to_owned()).filter(|n| !n.is_empty());
+                // Parentheses without a name are around a part of an argument.
+                if start < head.len() {
+                    return Some((head[start..].to_owned(), i + 1));
+                }
             }
             '(' | '[' | '{' => depth -= 1,
             ';' if depth == 0 => return None,
@@ -82,6 +92,21 @@ pub fn enclosing_call(before: &str) -> Option<String> {
         }
     }
     None
+}
+
+/// Returns where each argument of a call begins, from the text of its arguments so far.
+pub fn arguments(text: &str) -> Vec<usize> {
+    let mut depth = 0;
+    let mut all = vec![0];
+    for (i, c) in code(text) {
+        match c {
+            '(' | '[' | '{' => depth += 1,
+            ')' | ']' | '}' => depth -= 1,
+            ',' if depth == 0 => all.push(i + 1),
+            _ => {}
+        }
+    }
+    all
 }
 
 /// Lists the files and subfolders of the folder that a path names, relative to `base`;

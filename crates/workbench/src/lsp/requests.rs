@@ -9,9 +9,11 @@ use lsp_types::request::*;
 use lsp_types::{
     CompletionItem, CompletionItemKind, CompletionParams, CompletionTextEdit,
     DocumentFormattingParams, DocumentHighlight, DocumentHighlightParams, DocumentSymbol,
-    DocumentSymbolParams, GotoDefinitionParams, Hover, HoverContents, HoverParams, InlayHint,
-    InlayHintLabel, InlayHintParams, Location, MarkupContent, MarkupKind, ReferenceParams,
-    RenameParams, SemanticTokensParams, SymbolKind, TextDocumentPositionParams, TextEdit, Uri,
+    DocumentSymbolParams, Documentation, GotoDefinitionParams, Hover, HoverContents, HoverParams,
+    InlayHint, InlayHintLabel, InlayHintParams, Location, MarkupContent, MarkupKind,
+    ParameterInformation, ParameterLabel, ReferenceParams, RenameParams, SemanticTokensParams,
+    SignatureHelp, SignatureHelpParams, SignatureInformation, SymbolKind,
+    TextDocumentPositionParams, TextEdit, Uri,
 };
 use pcadlang_syntax::diag::{FileId, Span};
 use serde::Serialize;
@@ -28,6 +30,7 @@ pub fn handle(documents: &mut Documents, method: &str, params: Value) -> Answer<
     match method {
         HoverRequest::METHOD => with(documents, params, hover),
         Completion::METHOD => with(documents, params, completion),
+        SignatureHelpRequest::METHOD => with(documents, params, signature),
         GotoDefinition::METHOD => with(documents, params, definition),
         References::METHOD => with(documents, params, references),
         DocumentHighlightRequest::METHOD => with(documents, params, highlights),
@@ -96,6 +99,28 @@ fn completion(documents: &mut Documents, p: CompletionParams) -> Answer<Vec<Comp
         ..CompletionItem::default()
     };
     Ok(found.into_iter().enumerate().map(item).collect())
+}
+
+fn signature(documents: &mut Documents, p: SignatureHelpParams) -> Answer<Option<SignatureHelp>> {
+    let (encoding, at) = (documents.encoding, p.text_document_position_params);
+    let analysis = documents.get(&at.text_document.uri)?.analysis();
+    let Some(file) = source(analysis) else { return Ok(None) };
+    let found = analysis.signature(encoding.byte(file, at.position) as usize);
+    let argument = |(label, doc): ([u32; 2], String)| ParameterInformation {
+        label: ParameterLabel::LabelOffsets(label),
+        documentation: (!doc.is_empty()).then_some(Documentation::String(doc)),
+    };
+    Ok(found.map(|s| SignatureHelp {
+        active_signature: Some(0),
+        active_parameter: None,
+        signatures: vec![SignatureInformation {
+            label: s.label,
+            documentation: (!s.doc.is_empty()).then_some(Documentation::String(s.doc)),
+            // Beyond the arguments, none is marked.
+            active_parameter: Some(s.active.unwrap_or(s.arguments.len()) as u32),
+            parameters: Some(s.arguments.into_iter().map(argument).collect()),
+        }],
+    }))
 }
 
 fn item_kind(kind: CandidateKind) -> CompletionItemKind {

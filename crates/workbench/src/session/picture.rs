@@ -240,11 +240,13 @@ impl Layer {
         size: u32,
     ) -> Result<RgbImage, Failure> {
         let photo = image.and_then(ImageValue::as_photo);
-        let needed = || photo.ok_or_else(|| plain("there is no photograph"));
         let seen = || image.and_then(photo_contours).ok_or_else(|| plain("there is no photograph"));
         let camera = view.camera();
         let of = photo.map_or((camera.width, camera.height), |p| (p.width(), p.height()));
         let (width, height) = scaled(of, size);
+        let photo =
+            if size > ImageValue::SHOWN { photo } else { image.and_then(ImageValue::shown) };
+        let needed = || photo.ok_or_else(|| plain("there is no photograph"));
         let frame = || view.frame(size);
         Ok(match self {
             Layer::Overlay => {
@@ -293,7 +295,7 @@ impl Layer {
 /// or, if it used none, those of the built-in detector. `None` if there is no photograph.
 pub fn photo_contours(image: &ImageValue) -> Option<ContourMap> {
     // On a copy, so that contours detected here do not count as used.
-    let found = || ImageValue::photo(image.as_photo()?.clone()).map().ok().cloned();
+    let found = || ImageValue::photo(image.shown()?.clone()).map().ok().cloned();
     image.seen().or_else(found)
 }
 

@@ -3,6 +3,7 @@
 
 use super::rows::{self, Row};
 use super::setting::Setting;
+use pcadlang_inference::Search;
 use serde::{Deserialize, Serialize};
 
 /// The desired balance of accuracy and time.
@@ -47,6 +48,9 @@ pub struct Preset {
     /// The setting.
     #[serde(flatten)]
     pub setting: Setting,
+    /// What its start and warm-up make in any case.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub search: Option<Search>,
     /// The time of a run in seconds, the mean over cases.
     pub seconds: f64,
     /// The error, the mean over cases.
@@ -89,6 +93,7 @@ impl Preset {
             rows.iter().filter_map(|r| Some((r.clone(), own(r)?))).unzip();
         let preset = |i: usize| Preset {
             setting: settings[i].clone(),
+            search: None,
             seconds: rounded(rows[i].seconds),
             error: rounded(rows[i].error),
             interval: [rounded(rows[i].low), rounded(rows[i].high)],
@@ -130,6 +135,7 @@ mod tests {
 
     fn presets(all: &[(f64, f64)]) -> Presets {
         let one = |&(time, error): &(f64, f64)| Preset {
+            search: None,
             setting: Setting { time: Some(time), ..Setting::default() },
             seconds: time + 0.1,
             error,

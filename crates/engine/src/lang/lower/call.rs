@@ -10,6 +10,7 @@ use crate::lang::code::{BlockId, BlockKind, Callee, Op, Operand, Probe};
 use crate::lang::fault::Fault;
 use crate::lang::value::Value;
 use pcadlang_syntax::ast::{Arg, Expr, ExprKind};
+use pcadlang_syntax::diag::{Diagnostic, Severity};
 use pcadlang_syntax::span::Span;
 use smallvec::SmallVec;
 use std::sync::Arc;
@@ -247,6 +248,8 @@ impl Lowerer<'_> {
                     } else if let Some(fault) = refused(b, p, &args[*j].value) {
                         let e = self.error(fault.message, args[*j].value.span, "not allowed here");
                         e.hint_also(fault.hint.unwrap_or_else(|| b.signature()));
+                    } else if let Some(warning) = unlike_probabilities(b, p, &args[*j].value) {
+                        self.errors.push(warning);
                     }
                     operands.push(v.at);
                 }
@@ -395,6 +398,29 @@ impl Lowerer<'_> {
             .hint_also(signature);
         }
     }
+}
+
+/// How far the sum of weights may be from 1 by rounding, and how far if they are probabilities
+/// of which one is wrong or missing; anything else are weights of any scale.
+const NEAR_1: std::ops::Range<f64> = 0.011..0.25;
+
+/// A warning about weights that are written like probabilities, but do not sum to 1.
+fn unlike_probabilities(b: &Builtin, p: usize, written: &Expr) -> Option<Diagnostic> {
+    let of_weights = [("categorical", 0), ("mixture", 0), ("multinomial", 1)];
+    if !b.module.is_empty() || !of_weights.contains(&(&*b.name, p)) {
+        return None;
+    }
+    let Literal::Nums(weights) = Literal::of(written) else { return None };
+    let sum: f64 = weights.iter().sum();
+    let alike = weights.iter().all(|w| (0.0..=1.0).contains(w));
+    if !alike || !NEAR_1.contains(&(sum - 1.0).abs()) {
+        return None;
+    }
+    let sum = (sum * 1e9).round() / 1e9;
+    let message = format!("the weights of `{}` sum to {sum}, not to 1", b.name);
+    let warning = Diagnostic::new(Severity::Warning, message);
+    let hint = format!("if they are right, each is divided by {sum}; is one wrong or missing?");
+    Some(warning.primary(written.span, "weights like probabilities").hint(hint))
 }
 
 /// The fault of a number or word that is written where its argument does not take it.

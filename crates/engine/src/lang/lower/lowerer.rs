@@ -95,6 +95,7 @@ pub(super) struct Lowerer<'a> {
     pub inputs: Inputs<'a>,
     pub loaded: &'a Loaded,
     pub map: &'a mut SourceMap,
+    /// Errors and warnings.
     pub errors: Vec<Diagnostic>,
     pub modules: Vec<Module>,
     pub module: usize,

@@ -37,7 +37,7 @@ use super::value::Value;
 use indexmap::IndexMap;
 use lowerer::{Lowerer, PlanScope};
 use pcadlang_syntax::ast::KStmt;
-use pcadlang_syntax::diag::{Diagnostic, SourceMap};
+use pcadlang_syntax::diag::{Diagnostic, Severity, SourceMap};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
 
@@ -54,6 +54,8 @@ pub struct Compiled {
     pub reports: Vec<Report>,
     /// Its exports.
     pub exports: Vec<Export>,
+    /// What is suspicious in it, in the order of the text.
+    pub warnings: Vec<Diagnostic>,
 }
 
 /// Lowers a loaded program. The texts of `--set` values are added to `map`.
@@ -70,15 +72,17 @@ pub fn compile(
     l.function_bodies();
     let kernels = l.inference();
     l.unused_inputs();
-    if !l.errors.is_empty() {
-        // Errors without a location are about the command line; they come first.
-        l.errors.sort_by_key(|d| d.labels.first().map(|l| (l.span.file.0, l.span.start)));
-        l.errors.dedup();
-        return Err(l.errors);
+    // Errors without a location are about the command line; they come first.
+    l.errors.sort_by_key(|d| d.labels.first().map(|l| (l.span.file.0, l.span.start)));
+    l.errors.dedup();
+    let is_warning = |d: &Diagnostic| d.severity != Severity::Error;
+    let (warnings, errors): (Vec<_>, Vec<_>) = l.errors.into_iter().partition(is_warning);
+    if !errors.is_empty() {
+        return Err(errors);
     }
     l.code.finish();
     let (code, plans) = (Arc::new(l.code), l.plans);
-    Ok(Compiled { code, plans, kernels, reports: l.reports, exports: l.exports })
+    Ok(Compiled { code, plans, kernels, reports: l.reports, exports: l.exports, warnings })
 }
 
 /// Compiles an inference block that reads nothing of a program, such as the default one.

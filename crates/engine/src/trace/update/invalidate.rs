@@ -5,13 +5,19 @@
 //! change (except for choices that may have to be resampled). The second half
 //! ([`super::propagate`]) re-runs stale nodes on demand and stops where values come out
 //! equal.
+//!
+//! A comparison of a choice is looked at first: of a hundred tests `i < t`, another `t` turns
+//! few, and only these are invalidated.
 
 use super::Update;
+use crate::lang::builtins::Scalar;
 use crate::lang::code::{Callee, Code, Op, Operand};
+use crate::lang::value::Value;
 use crate::trace::choices::Target;
 use crate::trace::node::*;
 use crate::trace::propose::{Change, Pending};
 use crate::trace::store::Store;
+use pcadlang_numerics::dist::Datum;
 
 impl Update {
     /// Queues changes and invalidates what depends on them.
@@ -38,8 +44,22 @@ impl Update {
     /// reads it.
     pub fn invalidate_target(&mut self, store: &mut Store, code: &Code, n: NodeId) {
         self.make_stale(store, n);
-        self.invalidate_users(store, code, n);
+        let next = self.next_number(store, n);
+        self.invalidate_users(store, code, n, next);
         self.invalidate_pending(store, code);
+    }
+
+    /// Returns the number that a choice is about to become, if that is certain: it is the only
+    /// change, so that the choice's distribution stays.
+    fn next_number(&self, store: &Store, n: NodeId) -> Option<f64> {
+        let [Pending { node, element: NONE, change }] = &self.pending[..] else { return None };
+        let is_number = matches!(store[n].value, Value::Num(_)) && store.is_plain_choice(n);
+        match change {
+            Change::Set(Datum::Num(x)) | Change::Value(Datum::Num(x)) => {
+                (is_number && *node == n).then_some(*x)
+            }
+            _ => None,
+        }
     }
 
     /// Invalidates every evaluated node (full re-execution).
@@ -49,28 +69,39 @@ impl Update {
         }
     }
 
-    fn invalidate_each_outside(&mut self, store: &mut Store, code: &Code, n: NodeId) {
+    fn invalidate_each_outside(
+        &mut self,
+        store: &mut Store,
+        code: &Code,
+        n: NodeId,
+        next: Option<f64>,
+    ) {
         for i in 0..store.outside(n).users.len() {
             let user = store.outside(n).users[i];
-            self.invalidate(store, code, user);
+            if !next.is_some_and(|x| holds_as_before(store, code, user, (n, x))) {
+                self.invalidate(store, code, user);
+            }
         }
     }
 
     /// Invalidates the users of all nodes on the stack.
     fn invalidate_pending(&mut self, store: &mut Store, code: &Code) {
         while let Some(n) = self.stack.pop() {
-            self.invalidate_users(store, code, n);
+            self.invalidate_users(store, code, n, None);
         }
     }
 
-    /// Invalidates the users of a node; those that may propagate a change go onto the
-    /// stack.
-    fn invalidate_users(&mut self, store: &mut Store, code: &Code, n: NodeId) {
+    /// Invalidates the users of a node, of which the `next` number may be known; those that may
+    /// propagate a change go onto the stack.
+    fn invalidate_users(&mut self, store: &mut Store, code: &Code, n: NodeId, next: Option<f64>) {
         let facts = &code.slots[store[n].op];
         for user in &facts.users {
-            self.invalidate_static_user(store, code, n, n - facts.slot + *user);
+            let user = n - facts.slot + *user;
+            if !next.is_some_and(|x| holds_as_before(store, code, user, (n, x))) {
+                self.invalidate_static_user(store, code, n, user);
+            }
         }
-        self.invalidate_each_outside(store, code, n);
+        self.invalidate_each_outside(store, code, n, next);
         if !facts.is_result {
             return;
         }
@@ -203,5 +234,29 @@ impl Update {
         } else if facts.is_draw {
             self.stale_choices.push(n);
         }
+    }
+}
+
+/// True if a node is a comparison of numbers that comes out as it is when a choice becomes this
+/// number. If what it is compared with changes too, that invalidates the comparison by itself.
+fn holds_as_before(store: &Store, code: &Code, user: NodeId, (n, x): (NodeId, f64)) -> bool {
+    let node = &store[user];
+    let (Op::Prim { builtin, args }, Value::Bool(now)) = (store.op(user), &node.value) else {
+        return false;
+    };
+    let (Some(Scalar::Test(test)), [a, b]) = (code.builtins.get(*builtin).scalar, &args[..]) else {
+        return false;
+    };
+    let number = |o: &Operand| match store.resolve(node.frame, *o) {
+        Some(d) if d == n => Some(x),
+        Some(d) if store[d].state != State::Clean => None,
+        _ => match store.value(node.frame, *o) {
+            Value::Num(x) => Some(*x),
+            _ => None,
+        },
+    };
+    match (node.state, number(a), number(b)) {
+        (State::Clean, Some(a), Some(b)) => test(a, b) == *now,
+        _ => false,
     }
 }

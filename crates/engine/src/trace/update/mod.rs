@@ -70,6 +70,22 @@ impl Update {
         self.retired.clear();
         self.removed.clear();
         (self.appeared, self.vanished) = (0, 0);
+        self.next_epoch()
+    }
+
+    /// True if it has neither changed which choices there are nor drawn any.
+    pub fn is_fixed(&self) -> bool {
+        let none = self.redrawn.is_empty() && self.retired.is_empty() && self.removed.is_empty();
+        none && (self.appeared, self.vanished) == (0, 0)
+    }
+
+    /// Goes on with another change. True if the epochs start again.
+    pub fn renew(&mut self) -> bool {
+        self.pending.clear();
+        self.next_epoch()
+    }
+
+    fn next_epoch(&mut self) -> bool {
         let next = self.epoch.checked_add(1);
         self.epoch = next.unwrap_or(1);
         next.is_none()
