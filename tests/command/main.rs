@@ -13,6 +13,7 @@ mod hints;
 mod lsp;
 mod newcomers;
 mod nothing_lost;
+mod people;
 mod readme;
 mod repl;
 mod report;

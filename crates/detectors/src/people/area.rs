@@ -2,9 +2,10 @@
 //! is said to be.
 
 use super::consensus::{PersonBox, Run};
+use super::detection::{Detection, detect};
 use super::landmarks::{self, View};
 use super::window::Window;
-use super::{FindOptions, PeopleFinder, detection};
+use super::{FindOptions, PeopleFinder};
 use crate::boxes::overlap;
 use crate::nn::NetworkError;
 use pcadlang_scene::vision::Photo;
@@ -18,6 +19,10 @@ const AROUND_ALL: f64 = 1.25;
 /// of the person in it, and of a box that a user drew.
 pub(super) const DETECTED: f64 = 0.3;
 pub(super) const DRAWN: f64 = 0.2;
+/// Beyond the first detections of a view, those with a lower score than this are hardly ever
+/// people.
+const FIRST: usize = 2;
+const PROBABLE: f64 = 0.3;
 /// The minimum presence of the person in a box.
 const PRESENT: f64 = 0.5;
 
@@ -57,9 +62,10 @@ impl Area {
         options: &FindOptions,
     ) -> Result<Vec<Run>, NetworkError> {
         let view = Window { mirrored, ..self.window };
-        let found = detection::detect(&finder.detection, photo, &view, options.least)?;
+        let found = detect(&finder.detection, photo, &view, options.least)?;
         let mut runs = Vec::new();
-        for d in found.into_iter().take(options.most) {
+        let probable = |(i, d): &(usize, Detection)| *i < FIRST || d.score > PROBABLE;
+        for (_, d) in found.into_iter().take(options.most).enumerate().filter(probable) {
             if let Some(view) = twice(finder, photo, &d.window)? {
                 let score = self.person.map_or(d.score, |b| b.score.max(d.score));
                 runs.push(Run { score, in_box: self.person, found: d.window, view });

@@ -65,7 +65,7 @@ pub struct FindOptions {
 
 impl Default for FindOptions {
     fn default() -> Self {
-        FindOptions { views: 2, most: 2, least: 0.3, sure: 0.3 }
+        FindOptions { views: 2, most: 2, least: 0.05, sure: 0.4 }
     }
 }
 
@@ -164,11 +164,14 @@ fn said_to_be_people(objects: &[FoundObject], size: (u32, u32)) -> Vec<&FoundObj
     all
 }
 
-/// Combines the runs of a person, scaling pixels by `scale`.
-fn person(score: f64, runs: &[Run], scale: f64) -> Option<Person> {
+/// Combines the runs of a person, scaling pixels by `scale`. Where there are views of the whole
+/// picture, the pose is theirs: boxes err more often (docs/measurements/detectors.md).
+fn person(score: f64, all: &[Run], scale: f64) -> Option<Person> {
+    let whole: Vec<Run> = all.iter().filter(|r| r.in_box.is_none()).cloned().collect();
+    let runs = if whole.is_empty() { all } else { &whole };
     let mut c = consensus(runs)?;
-    let all = c.others.iter_mut().map(|h| &mut h.landmarks).chain([&mut c.landmarks]);
-    for l in all.flatten() {
+    let poses = c.others.iter_mut().map(|h| &mut h.landmarks).chain([&mut c.landmarks]);
+    for l in poses.flatten() {
         l.at = l.at.map(|x| x * scale);
         l.spread *= scale;
     }
@@ -182,7 +185,7 @@ fn person(score: f64, runs: &[Run], scale: f64) -> Option<Person> {
     };
     Some(Person {
         score,
-        sure: runs.iter().map(Run::sure).fold(0.0, f64::max),
+        sure: all.iter().map(Run::sure).fold(0.0, f64::max),
         bounds: [least(0), least(1), most(0), most(1)],
         torso: c.torso * scale,
         views: runs.len(),

@@ -1,7 +1,6 @@
 //! Tests of windows, grouping of detections and consensus of views; and, with the
 //! included networks, of a photograph.
 
-use super::Search;
 use super::consensus::{Run, by_person, consensus};
 use super::landmarks::{NAMED, SIDE, SeenLandmark, View};
 use super::window::{Beyond, Window};
@@ -178,7 +177,7 @@ fn views_count_by_how_sure_they_are_that_they_see_someone() {
 }
 
 mod shipped {
-    use crate::people::{FindOptions, PeopleFinder, Person};
+    use crate::people::{FindOptions, PeopleFinder, Person, Search};
     use pcadlang_scene::vision::{Limits, Photo, photo};
 
     fn finder() -> PeopleFinder {

@@ -1,0 +1,68 @@
+//! Whom a run finds in a photograph, and what it says and writes where there is nobody.
+
+use crate::common::folder::{Folder, png};
+use serde_json::Value;
+
+const SKIER: &str = "examples/images/skier.jpg";
+/// Few steps; the first of `modes` searches for the pose.
+const SHORT: [&str; 6] = ["--steps", "20", "--warmup", "40", "--chains", "2"];
+
+/// The skier to the right of as much snow, and the width of either half.
+fn with_snow(f: &Folder) -> u32 {
+    let skier = image::open(SKIER).unwrap().to_rgb8();
+    let (width, height) = skier.dimensions();
+    let snow = *skier.get_pixel(5, height - 5);
+    let pixel = |x: u32, y| if x < width { snow } else { *skier.get_pixel(x - width, y) };
+    f.write("snow.png", png(image::RgbImage::from_fn(2 * width, height, pixel)));
+    width
+}
+
+fn json(f: &Folder, name: &str) -> Value {
+    serde_json::from_str(&f.read(name)).unwrap()
+}
+
+#[test]
+fn what_was_found_is_the_first_line() {
+    let f = Folder::new("people_found");
+    std::fs::copy(SKIER, f.path().join("skier.jpg")).unwrap();
+    let run = ["run", "human.pcad", "--observe", "skier.jpg", "--out", "o"];
+    let done = f.run(&[&run[..], &SHORT].concat());
+    assert!(done.code == 0 && done.out.starts_with("found: "), "{}{}", done.out, done.err);
+    let (joints, record) = (json(&f, "o/keypoints.json"), json(&f, "o/run.json"));
+    assert_eq!(joints["found"], record["found"]);
+    assert_eq!(record["found"]["verdict"], "found");
+    let [sure, fit] = ["sure", "fit"].map(|name| record["found"][name].as_f64().unwrap());
+    assert!((0.5..=1.0).contains(&sure) && (0.55..=1.0).contains(&fit), "{sure} {fit}");
+}
+
+#[test]
+fn a_photograph_without_people_gets_no_body() {
+    let f = Folder::new("people_none");
+    std::fs::copy("examples/images/coffee_cup.png", f.path().join("cup.png")).unwrap();
+    let run = ["run", "human.pcad", "--observe", "cup.png", "--out", "o"];
+    let done = f.run(&[&run[..], &SHORT].concat());
+    let said = done.err.contains("not found: no person is seen in `photo`");
+    assert!(done.code == 1 && said && done.err.contains("--anyway"), "{}", done.err);
+    assert_eq!(json(&f, "o/keypoints.json")["found"]["verdict"], "not found");
+    assert!(!f.path().join("o/best.obj").exists());
+    f.succeeds(&[&run[..], &["--anyway", "--steps", "1", "--warmup", "1"]].concat());
+    assert!(f.path().join("o/best.obj").exists());
+}
+
+#[test]
+fn a_box_is_the_only_place_looked_at() {
+    let f = Folder::new("people_box");
+    let width = with_snow(&f);
+    let run = ["run", "human.pcad", "--observe", "snow.png", "--out", "o", "--box"];
+    let done = f.run(&[&run[..], &[&format!("0,0,{width},300")], &SHORT].concat());
+    let said = done.err.contains("no person fills the box");
+    assert!(done.code == 1 && said && !done.err.contains("R-hat"), "{}", done.err);
+    let found = |bounds: &str| {
+        let done = f.succeeds(&["detect", "snow.png", "--box", bounds, "-o", "people.json"]);
+        (done.out.lines().next().unwrap_or_default().to_owned(), json(&f, "people.json"))
+    };
+    assert_eq!(found(&format!("0,0,{width},300")).0, "no people were found");
+    let (said, people) = found(&format!("{width},0,{width},420"));
+    assert_eq!(said, "1 person");
+    assert!(people["annotations"][0]["bbox"][0].as_f64().unwrap() > f64::from(width));
+}
