@@ -60,6 +60,7 @@ impl Model {
     }
 
     /// Returns a hash of the program's text and of the files that it includes.
+    #[doc(hidden)]
     pub fn source_hash(&self) -> &str {
         &self.source_hash
     }
@@ -71,6 +72,7 @@ impl Model {
     }
 
     /// Returns what is suspicious in the program, and its sources.
+    #[doc(hidden)]
     pub fn warnings(&self) -> (&SourceMap, &[Diagnostic]) {
         (&self.sources, &self.compiled.warnings)
     }

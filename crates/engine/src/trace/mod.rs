@@ -202,6 +202,7 @@ impl Trace {
     ///
     /// # Errors
     /// If the program fails under the value; the trace is then as before the proposal.
+    #[doc(hidden)]
     pub fn propose_further(
         &mut self,
         target: Target,
