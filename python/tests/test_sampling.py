@@ -21,6 +21,7 @@ def test_the_draws_are_those_of_the_command_bit_for_bit(command: Command, images
     ]:
         program = pcadlang.Program.open(name)
         line: list[object] = [name, "--seed", 5, "--chains", 2, "--steps", steps, "--warmup", 20]
+        line += ["--overwrite"]
         if photo:
             program = program.set(tries=20, keep=2).observe(photo=images / photo)
             line += ["--observe", images / photo, "--set", "tries=20", "--set", "keep=2"]
