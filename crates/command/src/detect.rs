@@ -2,6 +2,7 @@
 
 use clap::Args;
 use image::RgbImage;
+use pcadlang_detectors::boxes::sides;
 use pcadlang_detectors::objects::{self, FoundObject, ObjectOptions, View};
 use pcadlang_detectors::people::{FindOptions, Person, Search, json};
 use pcadlang_report::pictures::{DETECTED, dots, limbs, picture_size, png};
@@ -113,9 +114,8 @@ fn detect_people(a: &Detect, photo: &Photo) -> Result<(), Failure> {
         .map_err(plain)?
         .find(photo, View::WHOLE, &ObjectOptions { most: usize::MAX, ..ObjectOptions::default() })
         .map_err(|e| plain(e.to_string()))?;
-    let search = a
-        .bounds
-        .map_or(Search::Everywhere(&objects), |[x, y, w, h]| Search::Within([x, y, x + w, y + h]));
+    let within = a.bounds.map(|b| Search::Within(sides(b)));
+    let search = within.unwrap_or(Search::Everywhere(&objects));
     let people = inputs::finder(a.models.as_deref())?
         .find(photo, search, &options, a.threads)
         .map_err(|e| plain(e.to_string()))?;

@@ -12,6 +12,17 @@ pub fn contains([left, top, right, bottom]: [f64; 4], [x, y]: [f64; 2]) -> bool 
     (left..=right).contains(&x) && (top..=bottom).contains(&y)
 }
 
+/// Returns the box of left, top, width and height.
+pub fn sides([x, y, w, h]: [f64; 4]) -> [f64; 4] {
+    [x, y, x + w, y + h]
+}
+
+/// Returns the smallest box around points; without any, an infinite one inside out.
+pub fn around(points: impl Iterator<Item = [f64; 2]>) -> [f64; 4] {
+    let none = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+    points.fold(none, |[l, t, r, b], [x, y]| [l.min(x), t.min(y), r.max(x), b.max(y)])
+}
+
 #[cfg(test)]
 mod tests {
     use super::overlap;

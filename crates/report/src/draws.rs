@@ -27,6 +27,11 @@ impl Default for ChainDraws {
 }
 
 impl Quantity {
+    /// Makes a quantity of the draws of each chain, which are not numbers of categories.
+    pub fn new(name: &str, column: Option<usize>, chains: Vec<Vec<f64>>) -> Quantity {
+        Quantity { name: name.into(), column, summary: summary(&chains), chains, frequent: None }
+    }
+
     /// Returns the reason why R-hat is undefined; `None` if it is defined.
     pub fn why_no_r_hat(&self) -> Option<&'static str> {
         if !self.summary.r_hat.is_nan() {
@@ -161,7 +166,7 @@ pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
     let quantity = |name: String, column, value: &dyn Fn(&DrawRow) -> Option<f64>| {
         let series: Vec<Vec<f64>> =
             chains.iter().map(|c| c.rows.iter().filter_map(value).collect()).collect();
-        Quantity { name, column, summary: summary(&series), chains: series, frequent: None }
+        Quantity::new(&name, column, series)
     };
     let mut out = vec![quantity("log_joint".into(), None, &|r| Some(r.log_joint))];
     let columns = chains.iter().map(|c| &c.columns[..]).find(|c| !c.is_empty()).unwrap_or_default();

@@ -191,7 +191,6 @@ pub(super) fn warning(modes: &[Mode]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pcadlang_inference::diagnostics::summary;
 
     fn noise(seed: u64, centre: f64) -> Vec<f64> {
         (0..400u64)
@@ -204,13 +203,7 @@ mod tests {
     fn quantity(name: &str, centres: [f64; 4]) -> Quantity {
         let chains: Vec<Vec<f64>> =
             centres.iter().zip(0..).map(|(c, s)| noise(13 + 977 * s, *c)).collect();
-        Quantity {
-            name: name.into(),
-            column: None,
-            summary: summary(&chains),
-            chains,
-            frequent: None,
-        }
+        Quantity::new(name, None, chains)
     }
 
     #[test]

@@ -110,16 +110,9 @@ fn too_short(q: &Quantity) -> bool {
 mod tests {
     use super::super::modes;
     use super::*;
-    use pcadlang_inference::diagnostics::summary;
 
     fn quantity(name: &str, chains: Vec<Vec<f64>>) -> Quantity {
-        Quantity {
-            name: name.into(),
-            column: None,
-            summary: summary(&chains),
-            chains,
-            frequent: None,
-        }
+        Quantity::new(name, None, chains)
     }
 
     /// Returns numbers between 0 and 1 without any order.

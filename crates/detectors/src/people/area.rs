@@ -113,7 +113,7 @@ fn twice(
     }
 }
 
-/// An upright window about the middle of a box, with a side that is some multiple of its longer side.
+/// An upright window about the middle of a box, its side a multiple of the box's longer side.
 fn square([left, top, right, bottom]: [f64; 4], times: f64) -> Window {
     let centre = [0.5 * (left + right), 0.5 * (top + bottom)];
     Window { centre, side: times * (right - left).max(bottom - top), turn: 0.0, mirrored: false }

@@ -2,6 +2,7 @@
 //! (Bazarevsky et al. 2020, "BlazePose").
 
 use super::window::{Beyond, Window};
+use crate::boxes::around;
 use crate::nn::{Network, NetworkError, sigmoid};
 use pcadlang_scene::vision::Photo;
 use pcadlang_scene::vision::keypoints::MEDIAPIPE;
@@ -47,11 +48,7 @@ pub(super) struct View {
 impl View {
     /// Returns left, top, right and bottom of the landmarks, within a picture of this size.
     pub fn bounds(&self, size: [f64; 2]) -> [f64; 4] {
-        let along =
-            |axis: usize| self.landmarks.iter().map(move |l| l.at[axis].clamp(0.0, size[axis]));
-        let least = |axis| along(axis).fold(f64::INFINITY, f64::min);
-        let most = |axis| along(axis).fold(f64::NEG_INFINITY, f64::max);
-        [least(0), least(1), most(0), most(1)]
+        around(self.landmarks.iter().map(|l| [0, 1].map(|k| l.at[k].clamp(0.0, size[k]))))
     }
 }
 

@@ -4,9 +4,9 @@
 //! The picture is examined in several views, padded and mirrored, and so is each box where a
 //! person is said to be: these networks alone miss people who are small in the picture. What
 //! most views of a person agree on is the pose; poses that only other views agree on are
-//! alternative hypotheses ([`Person::others`]). The result is a function of the picture alone, with the same
-//! bits on any machine and for any number of threads. The networks themselves
-//! (`pcadlang-models`) and the use of the landmarks are elsewhere.
+//! alternative hypotheses ([`Person::others`]). The result is a function of the picture and the
+//! boxes alone, with the same bits on any machine and for any number of threads. The networks
+//! themselves (`pcadlang-models`) and the use of the landmarks are elsewhere.
 
 mod area;
 mod consensus;
@@ -21,6 +21,7 @@ mod window;
 
 pub use person::{Hypothesis, Landmark, Person};
 
+use crate::boxes::around;
 use crate::nn::{Network, NetworkError};
 use crate::objects::FoundObject;
 use area::{Area, DETECTED, DRAWN};
@@ -144,7 +145,7 @@ impl PeopleFinder {
         people.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut all: Vec<Person> = Vec::new();
         for (score, runs) in people {
-            let person = person(score, &runs, scale).filter(|p| p.sure >= options.sure);
+            let person = person(score, runs, scale).filter(|p| p.sure >= options.sure);
             all.extend(person.filter(|p| !all.iter().any(|other| same(other, p))));
         }
         Ok(all)
@@ -166,18 +167,16 @@ fn said_to_be_people(objects: &[FoundObject], size: (u32, u32)) -> Vec<&FoundObj
 
 /// Combines the runs of a person, scaling pixels by `scale`. Where there are views of the whole
 /// picture, the pose is theirs: boxes err more often (docs/measurements/detectors.md).
-fn person(score: f64, all: &[Run], scale: f64) -> Option<Person> {
-    let whole: Vec<Run> = all.iter().filter(|r| r.in_box.is_none()).cloned().collect();
-    let runs = if whole.is_empty() { all } else { &whole };
-    let mut c = consensus(runs)?;
+fn person(score: f64, all: Vec<Run>, scale: f64) -> Option<Person> {
+    let sure = all.iter().map(Run::sure).fold(0.0, f64::max);
+    let (whole, boxed): (Vec<Run>, Vec<Run>) = all.into_iter().partition(|r| r.in_box.is_none());
+    let runs = if whole.is_empty() { boxed } else { whole };
+    let mut c = consensus(&runs)?;
     let poses = c.others.iter_mut().map(|h| &mut h.landmarks).chain([&mut c.landmarks]);
     for l in poses.flatten() {
         l.at = l.at.map(|x| x * scale);
         l.spread *= scale;
     }
-    let along = |axis: usize| c.landmarks.iter().map(move |l| l.at[axis]);
-    let least = |axis| along(axis).fold(f64::INFINITY, f64::min);
-    let most = |axis| along(axis).fold(f64::NEG_INFINITY, f64::max);
     let mask = |i: &usize| {
         let View { window, mask, .. } = &runs[*i].view;
         let centre = window.centre.map(|x| x * scale);
@@ -185,8 +184,8 @@ fn person(score: f64, all: &[Run], scale: f64) -> Option<Person> {
     };
     Some(Person {
         score,
-        sure: all.iter().map(Run::sure).fold(0.0, f64::max),
-        bounds: [least(0), least(1), most(0), most(1)],
+        sure,
+        bounds: around(c.landmarks.iter().map(|l| l.at)),
         torso: c.torso * scale,
         views: runs.len(),
         agreeing: c.agreeing.len(),

@@ -4,7 +4,7 @@ use super::found_objects::found;
 use super::hint::{self, HINT};
 use super::observed::{KeypointsValue, MaskValue, PeopleKey};
 use super::{IMAGE, ImageValue, native};
-use pcadlang_detectors::boxes::contains;
+use pcadlang_detectors::boxes::{contains, sides};
 use pcadlang_detectors::objects::View;
 use pcadlang_detectors::people::{FindOptions, Person, Search, networks};
 use pcadlang_engine::lang::builtins::{Row, Type, arg, int};
@@ -113,8 +113,7 @@ impl ImageValue {
     /// Returns the people that programs found where a hint says; `None` if none looked there.
     pub(super) fn people_by(&self, hint: &Hint) -> Option<Vec<Person>> {
         let around = hint.around(self.size().0, self.size().1).map(sides);
-        let within = self.prepared().known::<PeopleKey, Found>(|key| key.within == around);
-        let all = within?;
+        let all = self.prepared().known::<PeopleKey, Found>(|key| key.within == around)?;
         Some(ordered(&all, hint, self.size()).into_iter().map(|(p, _)| p).collect())
     }
 
@@ -161,11 +160,6 @@ fn on(found: &Found, p: [f64; 2], (width, height): (u32, u32)) -> Vec<usize> {
         true => (0..found.len()).filter(|i| contains(found[*i].0.bounds, p)).collect(),
         false => masked,
     }
-}
-
-/// Returns left, top, right and bottom of a box of left, top, width and height.
-fn sides([x, y, w, h]: [f64; 4]) -> [f64; 4] {
-    [x, y, x + w, y + h]
 }
 
 /// Returns whether a position, a fraction of the picture's width and height, is on a

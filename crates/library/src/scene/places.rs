@@ -3,7 +3,7 @@
 
 use super::ImageValue;
 use super::found_objects::{VIEWS, found};
-use pcadlang_detectors::boxes::{contains, overlap};
+use pcadlang_detectors::boxes::{contains, overlap, sides};
 use pcadlang_detectors::objects::FoundObject;
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_scene::vision::candidates::{Axis, Candidate, CandidateOptions, candidates, enclosed};
@@ -102,7 +102,7 @@ impl Place {
         let fills = |c: &&Candidate| {
             let scale = [size[0] / f64::from(c.mask.width()), size[1] / f64::from(c.mask.height())];
             let seen = c.mask.bounds().map(|b| [0, 1, 2, 3].map(|k| b[k] * scale[k % 2]));
-            let given = self.bounds.map(|[x, y, w, h]| [x, y, x + w, y + h]);
+            let given = self.bounds.map(sides);
             given.zip(seen).is_some_and(|(a, b)| overlap(a, b) > FILLS)
         };
         let filling: Vec<&Candidate> = all.iter().filter(fills).collect();

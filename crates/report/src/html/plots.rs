@@ -55,16 +55,9 @@ pub(super) fn scripts(quantities: &[Quantity]) -> String {
 mod tests {
     use super::*;
     use crate::embedded::tests::unpacked;
-    use pcadlang_inference::diagnostics::summary;
 
     fn steps(chains: Vec<Vec<f64>>) -> (Value, Vec<Vec<u16>>) {
-        let q = Quantity {
-            name: "x".into(),
-            column: None,
-            summary: summary(&chains),
-            chains,
-            frequent: None,
-        };
+        let q = Quantity::new("x", None, chains);
         let all = data(&[q]);
         let chains = all["quantities"][0]["chains"].as_array().unwrap();
         let read = |chain: &Value| {

@@ -1,17 +1,10 @@
 //! Tests of the page as a whole.
 
 use super::*;
-use pcadlang_inference::diagnostics::summary;
 
 fn quantity(name: &str) -> Quantity {
     let chains = vec![vec![1.0, 2.0, 4.0, 3.0, 2.0], vec![9.0, 8.0, 9.5, 9.0, 8.5]];
-    Quantity {
-        name: name.into(),
-        column: Some(0),
-        summary: summary(&chains),
-        chains,
-        frequent: None,
-    }
+    Quantity::new(name, Some(0), chains)
 }
 
 #[test]

@@ -19,8 +19,8 @@ const QUALITY: u8 = 90;
 /// The margin around the joints, as a fraction of their extent.
 const MARGIN: f64 = 0.15;
 
-/// Writes, for a picture of this size, `photo.jpg`, its contours as `photo_contours.png`, and `joints.png` if any were
-/// detected.
+/// Writes, for a picture of this size, `photo.jpg`, its contours as `photo_contours.png`, and
+/// `joints.png` if any were detected.
 pub fn show_seen(
     dir: &RunDir,
     image: &ImageValue,
