@@ -102,6 +102,7 @@ fn the_lathe_draws_the_same_on_any_number_of_threads() {
         let mut args =
             vec!["run", "lathe.pcad", "--observe", "disc.png", "--set", "size=48", "--chains", "2"];
         args.extend(["--steps", "60", "--warmup", "60", "--seed", "5", "--quiet", "--out", out]);
+        args.extend(["--set", "tries=100"]);
         args.extend(more);
         f.succeeds(&args);
         let all = draws(&f, out, 2);

@@ -15,6 +15,15 @@ pub fn sentence(run: &Value) -> Option<&str> {
     run["found"]["text"].as_str()
 }
 
+/// Returns how doubtful what a `run.json` says of its picture is, 0 to 1, if it has a verdict: the
+/// verdict, then the fit.
+pub fn doubt(run: &Value) -> Option<f64> {
+    let name = run["found"]["verdict"].as_str()?;
+    let rank = [Verdict::Found, Verdict::Perhaps, Verdict::NotFound].map(Verdict::name);
+    let rank = rank.iter().position(|r| *r == name)? as f64;
+    Some((rank + 1.0 - run["found"]["fit"].as_f64().unwrap_or(0.0)) / 3.0)
+}
+
 /// An object was found if its fit, the overlap of outlines, and the agreement of chains are
 /// at least these.
 const FOUND: [f64; 3] = [0.9, 0.86, 0.8];

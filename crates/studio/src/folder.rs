@@ -7,6 +7,7 @@ use pcadlang_library::shipped;
 use pcadlang_report::evaluation::MARK;
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::files;
+use pcadlang_runs::verdict;
 use pcadlang_scene::vision::{Limits, photo};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -146,8 +147,7 @@ impl Folder {
         Err(plain(format!("{name}: too many pictures have this name")))
     }
 
-    /// Lists the cases of an evaluation: failures first, then those whose chains agree
-    /// least.
+    /// Lists the cases of an evaluation: failures first, then by doubt.
     pub fn evaluation(&self, folder: &str) -> Result<Value, Failure> {
         let path = self.file(folder)?.join(MARK);
         let all: Value = serde_json::from_slice(&files::read(&path)?)
@@ -166,10 +166,11 @@ impl Folder {
                 let path = format!("{folder}/{name}/{file}");
                 self.path.join(&path).is_file().then_some(path)
             };
-            // Doubt: chains that disagree on the pixels, or on any quantity.
-            let apart = 1.0 - run["agreement"].as_f64().unwrap_or(1.0);
             let r_hat = row["r_hat_max"].as_f64();
-            let doubt = apart.max(r_hat.map_or(0.0, |r| 1.0 - 1.0 / r.max(1.0)));
+            // Without a verdict: chains that disagree on the pixels, or on any quantity.
+            let apart = 1.0 - run["agreement"].as_f64().unwrap_or(1.0);
+            let chains = apart.max(r_hat.map_or(0.0, |r| 1.0 - 1.0 / r.max(1.0)));
+            let doubt = verdict::doubt(&run).unwrap_or(chains);
             json!({
                 "name": name, "state": row["status"], "error": row["error"],
                 "picture": at("photo.jpg"), "overlay": at("overlay.png"), "run": format!("{folder}/{name}"),

@@ -212,6 +212,22 @@ pub(super) const TABLE: &[Row] = &[
     })
     .flat(),
     function(
+        "require",
+        SECTION,
+        &[
+            arg("x", Type::Any, "A value that the program uses."),
+            arg("condition", Type::Bool, "What must hold for it."),
+            arg("otherwise", Type::Str, "The error message where it does not."),
+        ],
+        Type::Any,
+        "`x`, or an error that ends the run where a condition does not hold, such as of the data.",
+        |a| match a.bool(1)? {
+            true => Ok(a.get(0).clone()),
+            false => Err(Fault::new(FaultKind::Other, a.str(2)?)),
+        },
+    )
+    .vjp(|_, _, by| Some(smallvec![by.clone(), Adjoint::Zero, Adjoint::Zero])),
+    function(
         "is_missing",
         SECTION,
         &[arg("x", Type::Any, "A value, or an array of them.")],

@@ -79,6 +79,7 @@ pub(super) const EXAMPLES: Examples = &[
     ("values", "values({ x: 1, y: 2 }) // [1, 2]"),
     ("has", "has({ x: 1 }, \"y\") // false"),
     ("any", "any([1, 5] > 4) // true"),
+    ("require", "require(len([4, 5]), 2 > 1, \"two numbers at least\") // 2"),
     ("is_missing", "is_missing([2, 0 / 0]) // [false, true]"),
     ("all", "all([1, 5] > 4) // false"),
     ("select", "select([1, 5] > 4, [10, 20], 0) // [0, 20]"),
