@@ -6,6 +6,7 @@
 
 pub mod dist;
 pub mod elimination;
+pub mod least_squares;
 pub mod num;
 pub mod platform;
 pub mod rng;
