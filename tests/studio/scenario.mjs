@@ -306,7 +306,7 @@ export async function scenario({ open, step, out, program }) {
     await until(near, "the wrist is not where it was pulled");
     await settled(page, PICTURE);
     await shot("human-pulled");
-    const note = checkChanged(before, await pixels(page, PICTURE), "the picture", 0.01);
+    const note = checkChanged(before, await pixels(page, PICTURE), "the picture", 0.005);
     check((await shownErrors(page)).length === 0, (await shownErrors(page)).join());
     await joint.focus();
     const [, now] = await middle();
