@@ -7,8 +7,11 @@ use nalgebra::{DMatrix, DVector};
 const DIFFERENCE: f64 = 1e-6;
 /// The first and least damping, relative to the diagonal of the normal equations.
 const DAMPING: f64 = 1e-3;
-/// The factor by which a step that fails raises the damping; one that succeeds lowers it as much.
+/// The damping is raised by this factor after a step that gains less than `POOR` of what the
+/// linear model promises, and lowered by it after one that gains more than `GOOD`.
 const FACTOR: f64 = 10.0;
+const POOR: f64 = 0.25;
+const GOOD: f64 = 0.75;
 /// How often the damping of one step is raised before the search ends.
 const TRIES: usize = 8;
 /// The search ends when a step lowers the sum by less than this part of it.
@@ -42,15 +45,23 @@ pub fn damped_least_squares(
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let normal = DMatrix::from_fn(x.len(), x.len(), |i, j| dot(&columns[i], &columns[j]));
         let slope = DVector::from_fn(x.len(), |i, _| -dot(&columns[i], &here));
+        let diagonal = normal.diagonal();
         let better = (0..TRIES).find_map(|_| {
             let mut damped = normal.clone();
-            (0..x.len()).for_each(|i| damped[(i, i)] += damping * normal[(i, i)] + f64::EPSILON);
+            let added = diagonal.map(|d| damping * d + f64::EPSILON);
+            (0..x.len()).for_each(|i| damped[(i, i)] += added[i]);
             let step = damped.cholesky()?.solve(&slope);
             let to: Vec<f64> = x.iter().zip(step.iter()).map(|(x, d)| x + d).collect();
-            let there = residuals(&to).map(|r| (square(&r), r)).filter(|(s, _)| *s < sum);
-            damping =
-                if there.is_some() { DAMPING.max(damping / FACTOR) } else { damping * FACTOR };
-            there.map(|(lower, r)| (to, lower, r))
+            let promised: f64 =
+                (0..x.len()).map(|i| step[i] * (slope[i] + added[i] * step[i])).sum();
+            let there = residuals(&to).map(|r| (square(&r), r));
+            let gained = there.as_ref().map_or(f64::NEG_INFINITY, |(lower, _)| sum - lower);
+            if gained < POOR * promised {
+                damping *= FACTOR;
+            } else if gained > GOOD * promised {
+                damping = DAMPING.max(damping / FACTOR);
+            }
+            there.filter(|_| gained > 0.0).map(|(lower, r)| (to, lower, r))
         });
         let Some((to, lower, there)) = better else { break };
         let gained = sum - lower;
