@@ -336,6 +336,7 @@ impl Session {
         let past = self.remember(what);
         (self.program, self.model, self.trace) = (other.program, other.model, other.trace);
         self.trace.set_limits(self.limits.clone());
+        self.grab = None;
         self.keep(past);
         Reply::text(self.summary())
     }
