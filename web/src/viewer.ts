@@ -90,11 +90,15 @@ export class Viewer {
       "div",
       { class: "frame-bar" },
       this.timeline.element,
-      this.play,
-      button("‹", () => this.step(-1), { "aria-label": "Previous", class: "quiet" }),
-      button("›", () => this.step(1), { "aria-label": "Next", class: "quiet" }),
-      this.chains,
-      this.label,
+      h(
+        "div",
+        { class: "frame-controls" },
+        this.play,
+        button("‹", () => this.step(-1), { "aria-label": "Previous", class: "quiet" }),
+        button("›", () => this.step(1), { "aria-label": "Next", class: "quiet" }),
+        this.chains,
+        this.label,
+      ),
     );
     this.panes = h(
       "div",
