@@ -193,7 +193,7 @@ fn a_client_plays_requests() {
     let wrong = "/* 𝄞 */ assume x ~ norml(0, 1);";
     let found = c.change(4, wrong)["diagnostics"][0].clone();
     assert_eq!(found["range"]["start"], json!({ "line": 0, "character": 20 }));
-    assert!(found["message"].as_str().unwrap().contains("did you mean `norm`?"));
+    assert!(found["message"].as_str().unwrap().contains("did you mean `normal`?"));
     assert_eq!(c.change(5, "let x = 1;")["diagnostics"], json!([]));
 
     // What does not fit is refused, and the server goes on.

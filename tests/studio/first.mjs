@@ -153,7 +153,7 @@ async function alone({ page, step, out }) {
     const runs = () => page.getByRole("tab", { name: "Runs" }).click();
     await page.keyboard.type("l(0, 1);");
     await press(page, "Start");
-    await page.locator(".error-box", { hasText: "norml" }).waitFor();
+    await page.locator(".error-box", { hasText: "did you mean `normal`" }).waitFor();
     await page.locator(".cm-lintRange-error").first().waitFor();
     await runs();
     check((await page.locator("#panel-runs tbody tr").count()) === 3, "a run was begun");

@@ -149,16 +149,37 @@ export async function scenario({ open, step, out, program }) {
     await shot("human-draws");
   });
 
-  await step("the slider goes through the draws", async () => {
-    const slider = page.locator(".frame-bar input[type=range]");
-    const most = Number(await slider.getAttribute("max"));
-    check(most > 0, "there is only one draw");
-    const label = await page.locator(".frame-label").innerText();
-    await slider.fill(String(most));
-    check((await page.locator(".frame-label").innerText()) !== label, "the label stays");
-    check(place(page).at === String(most), "the address does not say which draw");
+  await step("the timeline leads from the best state through the draws", async () => {
+    await press("Best");
+    const timeline = page.locator(".timeline");
+    await timeline.waitFor();
+    check(await timeline.locator(".playhead").isHidden(), "the best state is none of the draws");
+    const box = await timeline.boundingBox();
+    const y = box.y + box.height - 3;
+    // Scrubbed along the last chain, from its end to its beginning.
+    await page.mouse.move(box.x + box.width - 1, y);
+    await page.mouse.down();
+    await until(() => place(page).view === "draws", "the draws are not shown");
+    const last = Number(place(page).at);
     await settled(page, ".viewer .panes");
-    return `${most + 1} draws`;
+    const before = await pixels(page, PICTURE);
+    const space = await pixels(page, ".space");
+    await page.mouse.move(box.x + 2, y, { steps: 8 });
+    await page.mouse.up();
+    await until(() => Number(place(page).at) < last, "the first draw is not shown");
+    const first = Number(place(page).at);
+    const label = await page.locator(".frame-label").innerText();
+    check(label.includes("draw 1"), `the label says ${label}`);
+    await settled(page, ".viewer .panes");
+    await shot("human-timeline");
+    checkChanged(space, await pixels(page, ".space"), "the 3D view");
+    const note = checkChanged(before, await pixels(page, PICTURE), "the picture");
+    await page.keyboard.press("ArrowRight");
+    check(Number(place(page).at) === first + 1, "the right key does not move by one state");
+    await press("Draws");
+    await page.keyboard.press("ArrowLeft");
+    check(Number(place(page).at) === first, "the left key does not move back");
+    return `${last - first + 1} draws; ${note}`;
   });
 
   await step("the scene turns, and returns to the camera", async () => {
@@ -189,7 +210,7 @@ export async function scenario({ open, step, out, program }) {
 
   await step("the film plays from the prior to the posterior", async () => {
     await press("Film");
-    const slider = page.locator(".frame-bar input[type=range]");
+    const slider = page.locator(".timeline input[type=range]");
     await slider.fill("0");
     await settled(page, PICTURE);
     const before = await pixels(page, PICTURE);
@@ -255,6 +276,51 @@ export async function scenario({ open, step, out, program }) {
       checkChangedOrNull(before, await pixels(page, PICTURE)) === null,
       "undo does not restore the picture",
     );
+    return note;
+  });
+
+  await step("a limb is dragged over the photograph, and the picture follows", async () => {
+    await press("Limbs");
+    const joint = page.locator('.limb-layer [data-joint="l_wrist"]');
+    const middle = async () => {
+      const box = await joint.boundingBox();
+      return [box.x + box.width / 2, box.y + box.height / 2];
+    };
+    await joint.waitFor();
+    await settled(page, PICTURE);
+    await shot("human-joints");
+    const before = await pixels(page, PICTURE);
+    const [x, y] = await middle();
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    for (let i = 1; i <= 12; i++) {
+      await page.mouse.move(x + 1.5 * i, y - 3 * i);
+      await page.waitForTimeout(40);
+    }
+    await shot("human-pulling");
+    await page.mouse.up();
+    const near = async () => {
+      const [u, v] = await middle();
+      return Math.hypot(u - x - 18, v - y + 36) < 4;
+    };
+    await until(near, "the wrist is not where it was pulled");
+    await settled(page, PICTURE);
+    await shot("human-pulled");
+    const note = checkChanged(before, await pixels(page, PICTURE), "the picture", 0.005);
+    check((await shownErrors(page)).length === 0, (await shownErrors(page)).join());
+    await joint.focus();
+    const [, now] = await middle();
+    await page.keyboard.press("Shift+ArrowDown");
+    await until(async () => (await middle())[1] > now + 5, "a key does not pull");
+    for (let i = 0; i < 2; i++) {
+      const undone = await page.getByRole("button", { name: "Undo", exact: true }).getAttribute("title");
+      check(undone === "Undo drag of l_wrist", `to be undone is ${undone}`);
+      await press("Undo");
+      await page.waitForTimeout(300);
+    }
+    await until(async () => Math.abs((await middle())[1] - y) < 1, "undo leaves the wrist there");
+    await press("Limbs");
+    await joint.waitFor({ state: "hidden" });
     return note;
   });
 

@@ -77,7 +77,7 @@ export async function standalone({ open, step, out, program, viewer }) {
     const { page } = await open({ address: pathToFileURL(file).href });
     await page.locator("#viewer").scrollIntoViewIfNeeded();
     const note = await turn(page);
-    const slider = page.locator(".frame-bar input[type=range]");
+    const slider = page.locator(".timeline input[type=range]");
     const before = await pixels(page, SPACE);
     await slider.fill((await slider.getAttribute("max")) ?? "0");
     await settled(page, SPACE);

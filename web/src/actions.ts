@@ -346,6 +346,20 @@ export class Actions {
     link.click();
   }
 
+  /** Changes the session's state in a drag, which `last` ends; pictures follow it. */
+  async drag<T extends P.Moved>(method: string, params: object, last: boolean): Promise<T | null> {
+    const { store, connection } = this;
+    const session = store.now.session?.session;
+    if (session === undefined) return null;
+    const answer = await connection.ask<T>(method, { session, ...params });
+    const now = store.now.session;
+    if (now && answer.revision > now.revision) {
+      store.set({ session: { ...now, revision: answer.revision, log_joint: answer.log_joint } });
+    }
+    store.set({ moved: { coarse: !last } });
+    return answer;
+  }
+
   /** Reads the session again: its text and history, after a change. */
   refreshSession(): void {
     this.session.call();

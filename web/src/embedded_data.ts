@@ -65,6 +65,7 @@ export class EmbeddedData implements ViewerData {
     this.frames = scene.draws.map((draw, i) => ({
       label: draw.label ?? `Draw ${draw.draw ?? i}`,
       chain: draw.chain,
+      step: draw.draw,
       logJoint: draw.log_joint,
     }));
     this.layers = Object.keys(scene.layers);

@@ -18,6 +18,7 @@ import {
   type Tool,
 } from "./pointing";
 import type { Guess, Hint, Point } from "./protocol";
+import { svg } from "./svg";
 
 const TOOLS: [Tool, string, string][] = [
   [
@@ -57,6 +58,8 @@ interface Request {
 export class HintLayer {
   readonly bar: HTMLElement;
   readonly element: SVGSVGElement;
+  /** Called when a tool is chosen. */
+  onTool: () => void = () => {};
   private readonly pointing = new Pointing();
   private readonly tools = new Map<Tool, HTMLButtonElement>();
   private readonly clear = button("Clear", () => this.clearAll(), {
@@ -100,7 +103,7 @@ export class HintLayer {
     this.listen();
     pictures.element.before(this.bar);
     pictures.element.append(this.element, this.error.element);
-    pictures.onLook = () => this.draw();
+    pictures.onLook.push(() => this.draw());
     new ResizeObserver(() => this.draw()).observe(pictures.element);
     actions.store.on(["session", "view"], () => this.follow());
     this.follow();
@@ -138,6 +141,7 @@ export class HintLayer {
     if (tool === pointing.tool) return;
     pointing.cancel();
     // What a tool draws is about the session's photograph, seen without a scene over it.
+    if (tool) this.onTool();
     if (tool) this.actions.store.set({ view: "session", at: null });
     this.pictures.showPhotograph(tool !== null);
     pointing.tool = tool;
@@ -150,6 +154,11 @@ export class HintLayer {
     if (tool) this.element.setAttribute("tabindex", "0");
     else this.element.removeAttribute("tabindex");
     this.draw();
+  }
+
+  /** No tool is chosen any more. */
+  putDown(): void {
+    this.choose(null);
   }
 
   private clearAll(): void {
@@ -376,13 +385,4 @@ export class HintLayer {
 function path(lines: Point[][], closed: boolean): string {
   const end = closed ? "Z" : "";
   return lines.map((points) => `M${points.map((p) => p.join(" ")).join("L")}${end}`).join("");
-}
-
-function svg<K extends keyof SVGElementTagNameMap>(
-  tag: K,
-  attributes: Record<string, string | number>,
-): SVGElementTagNameMap[K] {
-  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
-  return element;
 }

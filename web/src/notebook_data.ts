@@ -14,7 +14,7 @@ export interface WidgetModel {
 export class NotebookData implements ViewerData {
   // Another solid is shown from where the user turned the view.
   readonly key = "solid";
-  readonly frames: Frame[] = [{ label: "The solid", chain: null, logJoint: null }];
+  readonly frames: Frame[] = [{ label: "The solid", chain: null, step: null, logJoint: null }];
   readonly layers: string[];
   readonly viewpoints = false;
   readonly pictureNote = "from the front";

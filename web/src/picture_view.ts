@@ -27,7 +27,7 @@ export class PictureView {
   /** The camera of the 3D view, for pictures from there. */
   viewOf3D: () => Camera | null = () => null;
   /** Called when another layer or viewpoint is chosen. */
-  onLook: () => void = () => {};
+  readonly onLook: (() => void)[] = [];
 
   private data: ViewerData | null = null;
   private frame = 0;
@@ -101,6 +101,12 @@ export class PictureView {
     return this.viewpoint === "given";
   }
 
+  /** Shows pictures as seen in the photograph. */
+  seeFromCamera(): void {
+    this.viewpoints.value = "given";
+    this.setViewpoint("given");
+  }
+
   /** Shows the photograph alone, or again the layer that it replaced. */
   showPhotograph(wanted: boolean): void {
     if (wanted === (this.behind !== null)) return;
@@ -116,7 +122,7 @@ export class PictureView {
     this.wanted = this.layer = layer;
     if (this.layers.value !== layer) this.layers.value = layer;
     this.onLayer(layer);
-    this.onLook();
+    this.looked();
     this.ask(this.frame);
   }
 
@@ -126,9 +132,13 @@ export class PictureView {
     if (viewpoint !== "given" && ["overlay", "photo", "residuals"].includes(this.layer)) {
       this.setLayer("scene");
     } else {
-      this.onLook();
+      this.looked();
       this.ask(this.frame);
     }
+  }
+
+  private looked(): void {
+    for (const listener of this.onLook) listener();
   }
 
   private later(wait: number): void {

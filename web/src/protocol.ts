@@ -121,6 +121,24 @@ export interface Densities {
   log_likelihood: number | null;
 }
 
+/** What a change in a drag answers. */
+export interface Moved extends Densities {
+  revision: number;
+}
+
+/** A landmark of the scene, pixels of the picture. */
+export interface Joint {
+  name: string;
+  at: Point;
+}
+
+/** The landmarks of the scene, in a picture of this size. */
+export interface Joints {
+  width: number;
+  height: number;
+  joints: Joint[];
+}
+
 export interface Choices extends Densities {
   total: number;
   choices: Choice[];
@@ -180,7 +198,8 @@ export interface Draw {
 
 export interface Draws {
   draws: Draw[];
-  film: number;
+  /** The states on the way from the prior, of the chain that ended best. */
+  film: { step: number; log_joint: number | null }[];
   chains: number;
 }
 

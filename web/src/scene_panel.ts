@@ -7,7 +7,8 @@ import type { Chooser } from "./chooser";
 import { HintLayer } from "./hint_layer";
 import { hasBest, imageItem } from "./protocol";
 import { StartPanel } from "./start_panel";
-import { StudioData } from "./studio_data";
+import { LimbLayer } from "./limb_layer";
+import { StudioData, statesOf, timelineOf } from "./studio_data";
 import { Viewer } from "./viewer";
 
 const VIEWS: [View, string][] = [
@@ -66,8 +67,15 @@ export class ScenePanel {
     }, { "aria-label": "Make and download", title: "Make and download a film or report" });
     this.exports = h("div", { class: "exports" }, edit, exports);
     this.viewer = new Viewer(this.views.element);
-    this.viewer.onFrame = (at) => store.set({ at });
-    new HintLayer(actions, this.viewer.pictures);
+    this.viewer.onFrame = (at) => store.set({ view: timelineOf(store.now) ?? store.now.view, at });
+    const hints = new HintLayer(actions, this.viewer.pictures);
+    const limbs = new LimbLayer(actions, this.viewer.pictures);
+    hints.onTool = () => limbs.show(false);
+    limbs.onShow = () => hints.putDown();
+    // Keys that nothing else has the focus for go along the timeline.
+    document.body.addEventListener("keydown", (event) => {
+      if (event.target === document.body) this.viewer.key(event);
+    });
     this.element = h(
       "div",
       { class: "scene" },
@@ -98,7 +106,7 @@ export class ScenePanel {
     this.views.enable("session", known.session !== null);
     this.views.enable("best", hasBest(run));
     this.views.enable("draws", (known.draws?.draws.length ?? run?.draws ?? 0) > 0);
-    this.views.enable("film", (known.draws?.film ?? run?.film ?? 0) > 0);
+    this.views.enable("film", (known.draws?.film.length ?? run?.film ?? 0) > 0);
     this.views.enable("modes", known.modes > 0);
     this.exports.hidden = run === null;
     for (const child of this.exports.children) {
@@ -107,6 +115,9 @@ export class ScenePanel {
     this.showStart();
     this.showNote();
     if (!known.connected) return;
+    const led = timelineOf(known);
+    const others = led ? statesOf({ ...known, view: led }).map(([frame]) => frame) : [];
+    this.viewer.setOthers(others);
     const data = new StudioData(connection, known);
     // Pictures are asked for again only when the state changed, not whenever anything is known.
     const revision = known.view === "session" ? known.session?.revision : run?.revision;

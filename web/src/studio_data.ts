@@ -12,7 +12,7 @@ const OF_PHOTOGRAPHS = ["overlay", "photo", "photo_contours", "residuals"];
 export function statesOf(known: Readonly<Known>): [Frame, State][] {
   const { view, run, session, draws, modes } = known;
   const plain = (label: string, logJoint: number | null = null): Frame => {
-    return { label, chain: null, logJoint };
+    return { label, chain: null, step: null, logJoint };
   };
   const several = (total: number, make: (i: number) => [Frame, State]) => {
     return Array.from({ length: total }, (_, i) => make(i));
@@ -24,18 +24,28 @@ export function statesOf(known: Readonly<Known>): [Frame, State][] {
   }
   if (run === null) return [];
   if (view === "film") {
-    return several(draws?.film ?? 0, (film) => [plain("From prior to posterior"), { run, film }]);
+    return (draws?.film ?? []).map(({ step, log_joint }, film) => [
+      { label: `Step ${step.toLocaleString("en")}`, chain: null, step, logJoint: log_joint },
+      { run, film },
+    ]);
   }
   if (view === "modes") return several(modes, (mode) => [plain(`Mode ${mode + 1}`), { run, mode }]);
   if (view === "draws") {
     return (draws?.draws ?? []).map((d, draw) => [
-      { label: `Chain ${d.chain}, draw ${d.draw}`, chain: d.chain, logJoint: d.log_joint },
+      { label: `Chain ${d.chain}, draw ${d.draw}`, chain: d.chain, step: d.draw, logJoint: d.log_joint },
       { run, draw },
     ]);
   }
   // A run that just began, or failed, has no state yet.
   const current = known.runs.find((r) => r.run === run) ?? null;
   return hasBest(current) ? [[plain("The best state so far"), { run }]] : [];
+}
+
+/** The view with several states to which the timeline leads while the best one is shown. */
+export function timelineOf(known: Readonly<Known>): "draws" | "film" | null {
+  if (known.view !== "best") return null;
+  if ((known.draws?.draws.length ?? 0) > 1) return "draws";
+  return (known.draws?.film.length ?? 0) > 1 ? "film" : null;
 }
 
 /** The state that is shown at present. */

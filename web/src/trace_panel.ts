@@ -4,7 +4,7 @@ import type { Actions } from "./actions";
 import { buildTree, passes, visibleRows, type Node, type Row } from "./address_tree";
 import { button, fill, filterField, h, number } from "./dom";
 import { Latest } from "./connection";
-import { wholeChoice, type Choices, type Densities, type State, type Value } from "./protocol";
+import { wholeChoice, type Choices, type Densities, type Moved, type State, type Value } from "./protocol";
 import { Panel } from "./panel";
 import { SelectedChoice } from "./selected_choice";
 import { stateOf } from "./studio_data";
@@ -259,18 +259,10 @@ export class TracePanel extends Panel {
   }
 
   private async send({ address, value, drag, last }: Assignment): Promise<void> {
-    const { store, connection } = this.actions;
-    const session = store.now.session;
-    if (!session) return;
-    const params = { session: session.session, address, value, drag };
-    const answer = await connection.ask<Densities & { revision: number }>("assign", params);
+    const answer = await this.actions.drag<Moved>("assign", { address, value, drag }, last);
+    if (!answer) return;
     this.error.clear();
-    const now = store.now.session;
-    if (now && answer.revision > now.revision) {
-      store.set({ session: { ...now, revision: answer.revision, log_joint: answer.log_joint } });
-    }
     this.showMoved(address, value, answer);
-    store.set({ moved: { coarse: !last } });
     if (last) this.endDrag();
   }
 

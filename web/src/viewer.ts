@@ -1,4 +1,4 @@
-// The viewer: a frame's picture and its mesh side by side, and a slider over the frames. The
+// The viewer: a frame's picture and its mesh side by side, and a timeline of the frames. The
 // studio, the report and the notebook all use it; only their data differ: in the studio they come
 // from the program, in a report they lie in the page, in a notebook the kernel has them.
 
@@ -6,11 +6,14 @@ import { button, fill, h, number, Segments, select, setOptions } from "./dom";
 import { PictureView } from "./picture_view";
 import type { Camera, Mesh } from "./protocol";
 import { SpaceView } from "./space_view";
+import { Timeline } from "./timeline";
 
-/** One place of the viewer's slider. */
+/** One place of the viewer's timeline. */
 export interface Frame {
   label: string;
   chain: number | null;
+  /** Its place along the chain; null: frames are evenly spaced. */
+  step: number | null;
   logJoint: number | null;
 }
 
@@ -48,7 +51,7 @@ const FRAMES_A_SECOND = 6;
 /** Shows frames. */
 export class Viewer {
   readonly element: HTMLElement;
-  /** Called when the user moved the slider. */
+  /** Called when the user moved along the timeline. */
   onFrame: (frame: number) => void = () => {};
   readonly pictures = new PictureView();
 
@@ -58,12 +61,15 @@ export class Viewer {
   private readonly space = new SpaceView();
   private readonly panes: HTMLElement;
   private readonly layout: Segments;
-  private readonly slider = h("input", { type: "range", min: "0", step: "1", value: "0" });
+  private readonly timeline = new Timeline();
+  /** The frames of other data, to which the timeline leads while these have only one. */
+  private others: Frame[] = [];
   private readonly label = h("output", { class: "frame-label" });
-  private readonly play = button("▶", () => this.togglePlay(), { "aria-label": "Play" });
-  private readonly chains = select([], "all", () => this.setFrame(this.frame), {
-    "aria-label": "Chain",
+  private readonly play = button("▶", () => this.togglePlay(), {
+    "aria-label": "Play",
+    class: "play",
   });
+  private readonly chains = select([], "all", () => this.showChain(), { "aria-label": "Chain" });
   private readonly bar: HTMLElement;
   private readonly seen = () => this.refresh();
   private arranged = "";
@@ -76,20 +82,23 @@ export class Viewer {
       ["both", "Both"],
     ];
     this.layout = new Segments("What is shown", layouts, "both", () => this.arrange());
-    this.slider.setAttribute("aria-label", "Frame");
-    this.slider.addEventListener("input", () => {
+    this.timeline.onScrub = (frame) => {
       this.stop();
-      this.setFrame(this.allowed()[Number(this.slider.value)] ?? 0, true);
-    });
+      this.go(frame);
+    };
     this.bar = h(
       "div",
       { class: "frame-bar" },
-      this.play,
-      button("‹", () => this.step(-1), { "aria-label": "Previous", class: "quiet" }),
-      this.slider,
-      button("›", () => this.step(1), { "aria-label": "Next", class: "quiet" }),
-      this.chains,
-      this.label,
+      this.timeline.element,
+      h(
+        "div",
+        { class: "frame-controls" },
+        this.play,
+        button("‹", () => this.step(-1), { "aria-label": "Previous", class: "quiet" }),
+        button("›", () => this.step(1), { "aria-label": "Next", class: "quiet" }),
+        this.chains,
+        this.label,
+      ),
     );
     this.panes = h(
       "div",
@@ -108,6 +117,7 @@ export class Viewer {
     this.space.onTurn = () => this.pictures.turned();
     new ResizeObserver(() => this.arrange()).observe(this.panes);
     document.addEventListener("visibilitychange", this.seen);
+    this.element.addEventListener("keydown", (event) => this.key(event));
     this.setData(null);
   }
 
@@ -136,7 +146,7 @@ export class Viewer {
     setOptions(this.chains, [["all", "All chains"], ...options], this.chains.value || "all");
     if (this.chains.selectedIndex < 0) this.chains.value = "all";
     this.chains.hidden = chains.length < 2;
-    this.bar.hidden = (data?.frames.length ?? 0) < 2;
+    this.showTimeline();
     const hasPictures = data === null || data.layers.length > 0;
     this.layout.element.hidden = !hasPictures;
     if (!hasPictures) this.layout.value = "space";
@@ -163,42 +173,81 @@ export class Viewer {
   }
 
   /** Shows a frame. */
-  setFrame(frame: number, byUser = false): void {
-    const allowed = this.allowed();
+  setFrame(frame: number): void {
+    const allowed = this.isElsewhere ? [0] : this.allowed();
     let place = allowed.indexOf(frame);
     if (place < 0) place = Math.max(0, allowed.findIndex((f) => f > frame));
     this.frame = allowed[place] ?? 0;
-    this.slider.max = String(Math.max(0, allowed.length - 1));
-    this.slider.value = String(place);
     this.describe(place, allowed.length);
     this.refresh(this.playing !== null);
-    if (byUser) this.onFrame(this.frame);
+  }
+
+  /** Sets the frames of other data, to which the timeline leads while these have only one. */
+  setOthers(others: Frame[]): void {
+    this.others = others;
+    this.showTimeline();
+  }
+
+  /** Moves by some frames of the chosen chain. */
+  step(by: number): void {
+    if (this.bar.hidden) return;
+    this.stop();
+    const allowed = this.allowed();
+    // All other frames lead to what is shown at present.
+    const place = this.isElsewhere ? allowed.length : allowed.indexOf(this.frame);
+    const frame = allowed[Math.min(allowed.length - 1, Math.max(0, place + by))];
+    if (frame !== undefined) this.go(frame);
+  }
+
+  /** The user wants a frame. */
+  private go(frame: number): void {
+    if (!this.isElsewhere) this.setFrame(frame);
+    this.onFrame(this.isElsewhere ? frame : this.frame);
+  }
+
+  private get isElsewhere(): boolean {
+    return (this.data?.frames.length ?? 0) < 2;
+  }
+
+  private get listed(): Frame[] {
+    return this.isElsewhere ? this.others : (this.data?.frames ?? []);
+  }
+
+  private showTimeline(): void {
+    this.bar.hidden = this.listed.length < 2;
+    this.play.hidden = this.isElsewhere;
+    if (this.isElsewhere) this.chains.hidden = true;
+    this.timeline.show(this.listed, this.allowed());
+    this.describe(this.allowed().indexOf(this.frame), this.allowed().length);
+  }
+
+  private showChain(): void {
+    this.timeline.show(this.listed, this.allowed());
+    this.setFrame(this.frame);
   }
 
   private describe(place: number, total: number): void {
+    if (this.isElsewhere) {
+      const text = `${this.listed.length} kept states`;
+      this.timeline.place(null, text);
+      fill(this.label, text, h("span", { class: "muted" }, "drag along the timeline, or press ←"));
+      return;
+    }
     const frame = this.data?.frames[this.frame];
     fill(this.label, frame ? `${frame.label}` : "");
     if (!frame) return;
-    this.slider.setAttribute("aria-valuetext", `${frame.label}, ${place + 1} of ${total}`);
+    this.timeline.place(this.frame, `${frame.label}, ${place + 1} of ${total}`);
     const joint = frame.logJoint === null ? "" : `log joint ${number(frame.logJoint)}`;
     this.label.append(h("span", { class: "muted" }, `${place + 1} / ${total}  ${joint}`));
   }
 
   /** The frames of the chosen chain. */
   private allowed(): number[] {
-    const frames = this.data?.frames ?? [];
+    const frames = this.listed;
     const chain = this.chains.value;
     const all = frames.map((_, i) => i);
-    if (chain === "all" || chain === "") return all;
+    if (this.isElsewhere || chain === "all" || chain === "") return all;
     return all.filter((i) => String(frames[i]!.chain) === chain);
-  }
-
-  private step(by: number): void {
-    this.stop();
-    const allowed = this.allowed();
-    const place = allowed.indexOf(this.frame) + by;
-    const frame = allowed[Math.min(allowed.length - 1, Math.max(0, place))];
-    if (frame !== undefined) this.setFrame(frame, true);
   }
 
   private togglePlay(): void {
@@ -207,7 +256,7 @@ export class Viewer {
       return;
     }
     const allowed = this.allowed();
-    if (this.frame === allowed[allowed.length - 1]) this.setFrame(allowed[0] ?? 0, true);
+    if (this.frame === allowed[allowed.length - 1]) this.go(allowed[0] ?? 0);
     this.play.textContent = "❚❚";
     this.play.setAttribute("aria-label", "Pause the film");
     const next = () => {
@@ -219,9 +268,19 @@ export class Viewer {
         return;
       }
       this.playing = setTimeout(next, 1000 / FRAMES_A_SECOND);
-      this.setFrame(frames[place]!, true);
+      this.go(frames[place]!);
     };
     this.playing = setTimeout(next, 0);
+  }
+
+  /** The arrow keys move by one frame, unless what has the focus uses them itself. */
+  key(event: KeyboardEvent): void {
+    const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    const own = "input, select, textarea, canvas, svg, [role=application], [contenteditable]";
+    const isUsed = event.defaultPrevented || (event.target as Element).closest(own) !== null;
+    if (!by || isUsed || event.altKey || event.ctrlKey || event.metaKey || this.bar.hidden) return;
+    event.preventDefault();
+    this.step(by);
   }
 
   private stop(): void {

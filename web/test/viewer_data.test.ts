@@ -10,7 +10,7 @@ import { EmbeddedData, type EmbeddedScene } from "../src/embedded_data";
 import { NotebookData } from "../src/notebook_data";
 import type { Camera, Mesh, Run, Session, State } from "../src/protocol";
 import { meshGeometry } from "../src/scene_geometry";
-import { StudioData, stateOf } from "../src/studio_data";
+import { StudioData, stateOf, statesOf, timelineOf } from "../src/studio_data";
 import type { ViewerData } from "../src/viewer";
 import { frame } from "./frames";
 
@@ -88,7 +88,7 @@ function known(patch: Partial<Known>): Known {
     session: session as unknown as Session,
     runs: [run as unknown as Run],
     run: "runs/a",
-    draws: { draws, film: 3, chains: 1 },
+    draws: { draws, film: [0, 1, 8].map((step) => ({ step, log_joint: -9 })), chains: 1 },
     modes: 2,
     ...patch,
   };
@@ -166,6 +166,16 @@ test("the studio asks for the state of the chosen view", async () => {
     else await data.mesh(Math.min(now.at ?? 0, data.frames.length - 1));
     assert.deepEqual(program.asked, state ? [["mesh", state]] : []);
   }
+});
+
+test("the timeline leads from the best state to the draws, or to the film before there are any", () => {
+  assert.equal(timelineOf(known({ view: "best" })), "draws");
+  const early = { draws: [], film: known({}).draws!.film, chains: 1 };
+  assert.equal(timelineOf(known({ view: "best", draws: early })), "film");
+  assert.equal(timelineOf(known({ view: "best", draws: null })), null);
+  assert.equal(timelineOf(known({ view: "session" })), null);
+  const film = statesOf(known({ view: "film" })).map(([frame]) => [frame.step, frame.label]);
+  assert.deepEqual(film[2], [8, "Step 8"]);
 });
 
 test("a program without a scene has choices, and no pictures", () => {

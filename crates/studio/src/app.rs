@@ -23,7 +23,7 @@ use pcadlang_runs::scene;
 use pcadlang_runs::{files, inputs};
 use pcadlang_scene::render::{Camera, View};
 use pcadlang_workbench::session::{
-    ChoiceRow, Layer, Marks, Request, Scores, observed_image, to_json,
+    ChoiceRow, Joints, Layer, Marks, Request, Scores, observed_image, to_json,
 };
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -96,6 +96,12 @@ impl App {
             }
             Call::Choices(c) => self.choices(c)?,
             Call::Assign(a) => self.assign(a)?,
+            Call::JointsOf(j) => self.sessions.get(j.session)?.ask(|open| {
+                let found = open.session.joints();
+                let (width, height) = found.size;
+                Ok(json!({ "width": width, "height": height, "joints": joints(&found) }))
+            })?,
+            Call::Pull(p) => self.pull(p)?,
             Call::Why(w) => {
                 let text = format!(":why {}", w.address);
                 let handle = self.sessions.get(w.session)?;
@@ -315,6 +321,17 @@ impl App {
         Ok(self.tell_session(id, said))
     }
 
+    fn pull(&self, p: protocol::Pull) -> Result<Value, Failure> {
+        let id = p.session;
+        let said = self.sessions.get(id)?.ask(move |open| {
+            let mut out = scores(open.session.pull(&p.joint, p.at, p.drag)?);
+            out["revision"] = json!(open.session.revision());
+            out["joints"] = joints(&open.session.joints());
+            Ok(out)
+        })?;
+        Ok(self.tell_session(id, said))
+    }
+
     fn begin(&self, b: protocol::Begin) -> Result<Value, Failure> {
         let folder = self.folder.path().to_owned();
         let job = self.sessions.get(b.session)?.ask(move |open| {
@@ -452,6 +469,11 @@ fn scores(s: Scores) -> Value {
         "log_joint": finite(s.joint), "log_prior": finite(s.prior),
         "log_likelihood": finite(s.likelihood),
     })
+}
+
+fn joints(found: &Joints) -> Value {
+    let seen = found.positions.iter().filter_map(|(name, at)| Some((name, (*at)?)));
+    seen.map(|(name, at)| json!({ "name": &**name, "at": at })).collect()
 }
 
 fn row(c: &ChoiceRow, rates: &BTreeMap<String, f64>, marks: &Marks) -> Value {

@@ -162,6 +162,15 @@ methods! {
         value: Value,
         #[serde(default)] drag: bool,
     }
+    /// The landmarks of a session's scene in its picture.
+    JointsOf = "joints" { session: u64 }
+    /// Pulls a landmark elsewhere; the choices that move it follow.
+    Pull = "pull" {
+        session: u64,
+        joint: String,
+        at: [f64; 2],
+        #[serde(default)] drag: bool,
+    }
     /// The dependencies of a choice, in both directions.
     Why = "why" { session: u64, address: String }
     /// Completes a word at the prompt.

@@ -2,6 +2,7 @@
 //! and files that show it.
 
 use super::run::Run;
+use pcadlang_inference::{KeptTrace, TrajectoryState};
 use pcadlang_report::embedded::topology;
 use pcadlang_report::{
     ChainDraws, Memory, Quantity, RunDir, modes, quantities, rename, reread, warnings,
@@ -56,14 +57,14 @@ fn all_quantities(run: &Run) -> Result<Vec<Quantity>, Failure> {
 
 /// Lists the kept draws.
 pub fn kept(run: &Run) -> Result<Value, Failure> {
-    let of = |k: &pcadlang_inference::KeptTrace| json!({ "chain": k.chain, "draw": k.draw, "log_joint": finite(k.log_joint) });
+    let of = |k: &KeptTrace| json!({ "chain": k.chain, "draw": k.draw, "log_joint": finite(k.log_joint) });
     let kept = run.kept()?;
     let film = run.film()?;
-    let steps: Vec<u64> = film.iter().map(|s| s.step).collect();
+    let on_the_way =
+        |s: &TrajectoryState| json!({ "step": s.step, "log_joint": finite(s.log_joint) });
     Ok(json!({
         "draws": kept.iter().map(of).collect::<Vec<_>>(),
-        "film": film.len(),
-        "film_steps": steps,
+        "film": film.iter().map(on_the_way).collect::<Vec<_>>(),
         "chains": run.job.as_ref().map(|j| j.sampling.chains()),
     }))
 }

@@ -3,6 +3,7 @@
 mod client;
 mod first;
 mod guesses;
+mod limbs;
 mod refused;
 mod runs;
 mod sessions;

@@ -52,7 +52,9 @@ fn a_run_is_that_of_the_command() {
     let q = page.ask("quantity", json!({ "run": "runs/linreg", "names": ["slope", "log_joint"] }));
     assert_eq!(q["quantities"][0]["chains"].as_array().unwrap().len(), 2);
     let kept = page.ask("draws", json!({ "run": "runs/linreg" }));
-    assert!(kept["draws"].as_array().unwrap().len() > 10 && kept["film"].as_u64().unwrap() > 10);
+    assert!(
+        kept["draws"].as_array().unwrap().len() > 10 && kept["film"].as_array().unwrap().len() > 10
+    );
     let state = json!({ "run": "runs/linreg", "draw": 3 });
     let choices = page.ask("choices", json!({ "state": state }));
     assert_eq!(choices["log_joint"], kept["draws"][3]["log_joint"]);

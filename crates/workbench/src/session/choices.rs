@@ -319,7 +319,7 @@ impl Session {
         let value = self.value_of(value)?;
         let address = addressed(name).parse().map_err(|e| plain(format!("{e}")))?;
         let past = self.remember(&format!(":set {text}"));
-        let (before, after) = self.give(address, value)?;
+        let (before, after) = self.give(&[(address, Given::Value(value))])?;
         self.keep(past);
         Ok(Reply::text(before.to(after)))
     }
@@ -336,7 +336,7 @@ impl Session {
         let is_same = joins && self.dragged.as_ref() == Some(&at);
         let past = (!is_same).then(|| self.remember(&format!(":set {address} {}", short(&value))));
         self.clock += 1;
-        let (_, after) = self.give(at.clone(), value)?;
+        let (_, after) = self.give(&[(at.clone(), Given::Value(value))])?;
         if let Some(past) = past {
             self.keep(past);
         }
@@ -344,12 +344,10 @@ impl Session {
         Ok(after)
     }
 
-    /// Gives a value to a choice or an observation. Returns the log densities before and
-    /// after.
-    fn give(&mut self, address: Address, value: Value) -> Result<(Scores, Scores), Failure> {
+    /// Gives values to choices or observations. Returns the log densities before and after.
+    pub(super) fn give(&mut self, given: &[(Address, Given)]) -> Result<(Scores, Scores), Failure> {
         let before = Scores::of(&self.trace);
-        let given = [(address, Given::Value(value))];
-        self.trace.update(&given, self.values()).map_err(|e| Failure::run(&self.model, *e))?;
+        self.trace.update(given, self.values()).map_err(|e| Failure::run(&self.model, *e))?;
         let after = Scores::of(&self.trace);
         if after.joint == f64::NEG_INFINITY && before.joint > f64::NEG_INFINITY {
             let by: Vec<String> =

@@ -14,6 +14,7 @@ mod complete;
 mod draws;
 mod edit;
 mod files;
+mod limbs;
 mod look;
 mod picture;
 mod plot;
@@ -28,6 +29,7 @@ pub use choices::{ChoiceRow, Marks, Scores, short, to_json};
 pub use command::{COMMANDS, Command};
 pub use complete::Completion;
 pub use files::{exported, exported_operand};
+pub use limbs::Joints;
 pub use picture::{
     Layer, ViewPicture, as_view, detected, observed_image, over, photo_contours, picture_operand,
     view,

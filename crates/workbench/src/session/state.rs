@@ -1,6 +1,7 @@
 //! The state of a session: program, model and trace, and the states for `:undo`.
 
 use super::background::{Background, Finished, Status};
+use super::limbs::Grab;
 use super::reply::Reply;
 use crate::failure::{Failure, plain};
 use pcadlang_engine::lang::code::{Eager, Observed};
@@ -51,6 +52,8 @@ pub struct Session {
     /// The address that [`Session::assign`] changed last, if the next change of it joins
     /// that one.
     pub(super) dragged: Option<Address>,
+    /// The joint that [`Session::pull`] pulled last.
+    pub(super) grab: Option<Grab>,
     /// The folder below which entries may use files, if not everywhere.
     confined: Option<PathBuf>,
 }
@@ -112,6 +115,7 @@ impl Session {
             last: None,
             watch: None,
             dragged: None,
+            grab: None,
             confined: None,
         };
         let model = Arc::clone(&session.model);
@@ -332,6 +336,7 @@ impl Session {
         let past = self.remember(what);
         (self.program, self.model, self.trace) = (other.program, other.model, other.trace);
         self.trace.set_limits(self.limits.clone());
+        self.grab = None;
         self.keep(past);
         Reply::text(self.summary())
     }

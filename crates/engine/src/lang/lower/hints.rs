@@ -5,7 +5,7 @@
 //! correct.
 
 use super::lowerer::Lowerer;
-use crate::lang::builtins::{Builtin, Kind};
+use crate::lang::builtins::{Builtin, Kind, Type};
 use pcadlang_syntax::ast::{Arg, ItemKind, Name, Stmt, StmtKind};
 use pcadlang_syntax::diag::{Diagnostic, nearest};
 use pcadlang_syntax::elsewhere::called_here;
@@ -38,7 +38,11 @@ impl Lowerer<'_> {
             .filter(|b| b.module.is_empty() && b.name.starts_with(|c: char| c.is_alphabetic()))
             .filter(|b| !matches!(b.kind, Kind::Plan(_)))
             .map(|b| &*b.name);
-        let near = nearest(name, visible.iter().map(|n| &**n).chain(known)).map(str::to_owned);
+        let dists = builtins.iter().filter(|b| b.module.is_empty() && b.returns == Type::Dist);
+        let dists = dists.map(|b| &*b.name);
+        let visible = || visible.iter().map(|n| &**n);
+        let drawn = self.is_drawn(span).then(|| nearest(name, dists.chain(visible()))).flatten();
+        let near = drawn.or_else(|| nearest(name, visible().chain(known))).map(str::to_owned);
         // A name of a namespace, written without the namespace.
         let inside = self.modules[self.module].namespaces.iter().find_map(|(ns, space)| {
             let module = &self.modules[space.module];
@@ -77,6 +81,13 @@ impl Lowerer<'_> {
         if let Some(hint) = inside.or(module).or(called).or(of_a_run).or(near).or(lives) {
             e.hint_also(hint);
         }
+    }
+
+    /// True if a name is that of the distribution after `~` or `observe`.
+    fn is_drawn(&self, name: Span) -> bool {
+        let text = self.map.get(name.file).and_then(|f| f.text().get(..name.start as usize));
+        let before = text.unwrap_or_default().trim_end();
+        before.ends_with('~') || before.ends_with("observe")
     }
 
     /// Returns where the current file binds the name.
