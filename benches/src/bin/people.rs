@@ -1,6 +1,6 @@
 //! Measures how many people of whole photographs are found, and how well.
 //!
-//!     cargo run --release -p pcadlang-benches --bin people -- PEOPLE.json FOLDER [ids=even|odd|all] [least=0.5]
+//!     cargo run --release -p pcadlang-benches --bin people -- PEOPLE.json FOLDER [ids=even|odd|all] [least=0.3,0.4]
 //!
 //! PEOPLE.json has people as COCO annotates them (`images`, `annotations` with `keypoints`), FOLDER
 //! the photographs. Asked for are people who are at least a sixth of the picture's height and
@@ -9,11 +9,11 @@
 //! longer side of the box); of those found, joints within 0.2 of a torso are right (PCKt@0.2).
 //! A detection whose box overlaps no annotated one by 0.2 is where nobody is; another one that
 //! finds none of those asked for is a second one, or someone small.
-//! Only people with a confidence of `least` or more count.
+//! Only people with a confidence of `least` or more count, for each of these.
 
 use pcadlang_detectors::boxes::overlap;
-use pcadlang_detectors::objects::{self, ObjectOptions, View};
-use pcadlang_detectors::people::{FindOptions, Person, Search, networks};
+use pcadlang_detectors::objects::{self, ObjectOptions};
+use pcadlang_detectors::people::{FindOptions, Person, Search, VIEWS_OF_PEOPLE, networks};
 use pcadlang_scene::vision::{Limits, photo};
 use serde_json::Value;
 use std::path::Path;
@@ -114,20 +114,24 @@ impl Sums {
 fn main() -> Result<(), String> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [file, folder, rest @ ..] = &arguments[..] else {
-        return Err("usage: people PEOPLE.json FOLDER [ids=even|odd|all] [least=0.5]".into());
+        return Err("usage: people PEOPLE.json FOLDER [ids=even|odd|all] [least=0.3,0.4]".into());
     };
-    let (mut ids, mut least) = ("all", 0.5);
+    let (mut ids, mut least) = ("all", vec![FindOptions::default().sure]);
     for argument in rest {
         match argument.split_once('=') {
             Some(("ids", v)) => ids = v,
-            Some(("least", v)) => least = v.parse().map_err(|_| "least needs a number")?,
+            Some(("least", v)) => {
+                let all: Result<_, _> = v.split(',').map(str::parse).collect();
+                least = all.map_err(|_| "least needs numbers")?;
+            }
             _ => return Err(format!("{argument} is no option")),
         }
     }
     let text = std::fs::read_to_string(file).map_err(|e| e.to_string())?;
     let data: Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
     let (finder, boxes) = (networks::finder()?, objects::networks::finder()?);
-    let mut sums = Sums::default();
+    let mut sums: Vec<(f64, Sums)> = least.into_iter().map(|l| (l, Sums::default())).collect();
+    let sure = sums.iter().map(|(l, _)| *l).fold(1.0, f64::min);
     for image in data["images"].as_array().ok_or("no images")? {
         let id = image["id"].as_u64().unwrap_or(0);
         if ids != "all" && (ids == "even") != id.is_multiple_of(2) {
@@ -137,32 +141,39 @@ fn main() -> Result<(), String> {
         let bytes = std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?;
         let photo = photo::decode(&bytes, &Limits::default()).map_err(|e| e.to_string())?;
         let wide = ObjectOptions { least: 0.05, most: usize::MAX };
-        let seen = boxes.find(&photo, View::WHOLE, &wide).map_err(|e| e.to_string())?;
-        let options = FindOptions { most: 20, ..FindOptions::default() };
+        let seen =
+            boxes.find_in_views(&photo, VIEWS_OF_PEOPLE, &wide).map_err(|e| e.to_string())?;
+        let options = FindOptions { most: 20, sure, ..FindOptions::default() };
         let people = finder.find(&photo, Search::Everywhere(&seen), &options, 0);
-        let mut people = people.map_err(|e| e.to_string())?;
-        people.retain(|p| p.sure >= least);
+        let people = people.map_err(|e| e.to_string())?;
         let annotations = data["annotations"].as_array().ok_or("no annotations")?;
         let all: Vec<Truth> =
             annotations.iter().filter(|a| a["image_id"] == image["id"]).map(truth).collect();
-        sums.add(&all, f64::from(photo.height()), &people);
+        for (least, sums) in &mut sums {
+            let sure: Vec<Person> = match people.iter().any(|p| p.sure >= *least) {
+                true => people.iter().filter(|p| p.sure >= 0.75 * *least).cloned().collect(),
+                false => Vec::new(),
+            };
+            sums.add(&all, f64::from(photo.height()), &sure);
+        }
         let sure: Vec<String> = people.iter().map(|p| format!("{:.2}", p.sure)).collect();
         println!("{}: {} annotated, {}", path.display(), all.len(), sure.join(" "));
     }
-    let s = &sums;
     let part = |a: usize, b: usize| 100.0 * a as f64 / b.max(1) as f64;
-    println!(
-        "{} pictures: {} of {} people found ({:.0}%), {:.1}% of their joints right; {} detections where \
-         nobody is, {} others; somebody in {} of {} pictures without people",
-        s.pictures,
-        s.found,
-        s.asked,
-        part(s.found, s.asked),
-        part(s.right, s.joints),
-        s.nobody,
-        s.others,
-        s.filled,
-        s.empty
-    );
+    for (least, s) in &sums {
+        println!(
+            "{least}: {} pictures: {} of {} people found ({:.0}%), {:.1}% of their joints right; {} \
+             detections where nobody is, {} others; somebody in {} of {} pictures without people",
+            s.pictures,
+            s.found,
+            s.asked,
+            part(s.found, s.asked),
+            part(s.right, s.joints),
+            s.nobody,
+            s.others,
+            s.filled,
+            s.empty
+        );
+    }
     Ok(())
 }

@@ -4,7 +4,7 @@ use clap::Args;
 use image::RgbImage;
 use pcadlang_detectors::boxes::sides;
 use pcadlang_detectors::objects::{self, FoundObject, ObjectOptions, View};
-use pcadlang_detectors::people::{FindOptions, Person, Search, json};
+use pcadlang_detectors::people::{FindOptions, Person, Search, VIEWS_OF_PEOPLE, json};
 use pcadlang_report::pictures::{DETECTED, dots, limbs, picture_size, png};
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::hint::rectangle;
@@ -112,7 +112,11 @@ fn detect_people(a: &Detect, photo: &Photo) -> Result<(), Failure> {
     let options = FindOptions { views: a.views, most: a.people as usize, ..FindOptions::default() };
     let objects = objects::networks::finder()
         .map_err(plain)?
-        .find(photo, View::WHOLE, &ObjectOptions { most: usize::MAX, ..ObjectOptions::default() })
+        .find_in_views(
+            photo,
+            VIEWS_OF_PEOPLE,
+            &ObjectOptions { most: usize::MAX, ..ObjectOptions::default() },
+        )
         .map_err(|e| plain(e.to_string()))?;
     let within = a.bounds.map(|b| Search::Within(sides(b)));
     let search = within.unwrap_or(Search::Everywhere(&objects));

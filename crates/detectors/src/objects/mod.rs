@@ -15,6 +15,7 @@ mod tests;
 pub use classes::CLASSES;
 
 use crate::nn::{Network, NetworkError};
+use pcadlang_numerics::platform::threads::side_by_side;
 use pcadlang_scene::vision::Photo;
 
 /// The side of the network's input, in samples.
@@ -38,6 +39,17 @@ impl View {
     /// The photograph as it is, as large as it can be.
     pub const WHOLE: View = View { part: 1.0, mirrored: false };
 }
+
+/// Views for where an object that is missed, or a box that is off, costs more than the time: the
+/// larger an object is in the photograph, the smaller the view that shows it as the network knows
+/// its kind (docs/measurements/objects.md).
+pub const VIEWS: [View; 6] = {
+    const fn seen(part: f64) -> [View; 2] {
+        [View { part, mirrored: false }, View { part, mirrored: true }]
+    }
+    let ([a, b], [c, d], [e, f]) = (seen(1.0), seen(0.67), seen(0.55));
+    [a, b, c, d, e, f]
+};
 
 /// Options of the search for objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,6 +106,27 @@ impl ObjectFinder {
             NetworkError::Format("it is not a detector of objects (nanodet.json)".into())
         })?;
         Ok(ObjectFinder { network, outputs })
+    }
+
+    /// Returns the objects in a photograph, each once for each view that it is seen in, those with
+    /// the highest scores first. The views are examined in parallel.
+    ///
+    /// # Errors
+    /// Errors of the network, which valid ones do not have.
+    pub fn find_in_views(
+        &self,
+        photo: &Photo,
+        views: &[View],
+        options: &ObjectOptions,
+    ) -> Result<Vec<FoundObject>, NetworkError> {
+        let mut looked: Vec<_> = views.iter().map(|view| (*view, Ok(Vec::new()))).collect();
+        side_by_side(looked.iter_mut(), |_, (view, found)| {
+            *found = self.find(photo, *view, options);
+        });
+        let found = looked.into_iter().map(|(_, found)| found);
+        let mut all = found.collect::<Result<Vec<_>, _>>()?.concat();
+        all.sort_by(|a, b| b.score.total_cmp(&a.score));
+        Ok(all)
     }
 
     /// Returns the objects in a photograph, as seen in one view of it, those with the highest

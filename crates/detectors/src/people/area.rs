@@ -5,26 +5,25 @@ use super::consensus::{PersonBox, Run};
 use super::detection::{Detection, detect};
 use super::landmarks::{self, View};
 use super::window::Window;
-use super::{FindOptions, PeopleFinder};
+use super::{FindOptions, PRESENT, PeopleFinder};
 use crate::boxes::overlap;
 use crate::nn::NetworkError;
 use pcadlang_scene::vision::Photo;
 
 /// A box is looked at with this much around it, on each side, as a fraction of its longer side.
 const AROUND: f64 = 0.1;
-/// If nobody is detected in a box, landmarks are looked for in a window of this many times its
-/// longer side.
+/// Landmarks are also looked for in a window of this many times the longer side of a box.
 const AROUND_ALL: f64 = 1.25;
 /// The minimum overlap (intersection over union) of a detector's box with that of the landmarks
 /// of the person in it, and of a box that a user drew.
-pub(super) const DETECTED: f64 = 0.3;
-pub(super) const DRAWN: f64 = 0.2;
+const DETECTED: f64 = 0.3;
+const DRAWN: f64 = 0.2;
+/// The minimum presence of landmarks in a detector's box: it is low where others are in front.
+const HIDDEN: f64 = 0.05;
 /// Beyond the first detections of a view, those with a lower score than this are hardly ever
 /// people.
 const FIRST: usize = 2;
 const PROBABLE: f64 = 0.3;
-/// The minimum presence of the person in a box.
-const PRESENT: f64 = 0.5;
 
 /// A part of a photograph.
 #[derive(Clone, Copy, Debug)]
@@ -32,8 +31,6 @@ pub(super) struct Area {
     window: Window,
     /// The box of one person.
     person: Option<PersonBox>,
-    /// The minimum overlap of the box with that of the person's landmarks.
-    fills: f64,
     size: [f64; 2],
 }
 
@@ -41,16 +38,17 @@ impl Area {
     /// The whole of a photograph of some size, with padding.
     pub fn whole((width, height): (u32, u32), padding: f64) -> Area {
         let size = [width, height].map(f64::from);
-        Area { window: Window::whole(width, height, padding), person: None, fills: 0.0, size }
+        Area { window: Window::whole(width, height, padding), person: None, size }
     }
 
     /// The surroundings of a person's box in such a photograph, with more padding.
-    pub fn around(person: PersonBox, fills: f64, size: (u32, u32), padding: f64) -> Area {
+    pub fn around(person: PersonBox, size: (u32, u32), padding: f64) -> Area {
         let window = square(person.bounds, 1.0 + 2.0 * (AROUND + padding));
-        Area { window, person: Some(person), fills, ..Area::whole(size, 0.0) }
+        Area { window, person: Some(person), ..Area::whole(size, 0.0) }
     }
 
-    /// Returns a run for each person detected there, one at most in a box.
+    /// Returns the runs of the networks that see a person there; in a box, those of whoever
+    /// fills it.
     ///
     /// # Errors
     /// Errors of the networks.
@@ -63,41 +61,50 @@ impl Area {
     ) -> Result<Vec<Run>, NetworkError> {
         let view = Window { mirrored, ..self.window };
         let found = detect(&finder.detection, photo, &view, options.least)?;
-        let mut runs = Vec::new();
         let probable = |(i, d): &(usize, Detection)| *i < FIRST || d.score > PROBABLE;
-        for (_, d) in found.into_iter().take(options.most).enumerate().filter(probable) {
+        let found = found.into_iter().take(options.most).enumerate().filter(probable);
+        let mut runs = Vec::new();
+        for (_, d) in found {
             if let Some(view) = twice(finder, photo, &d.window)? {
-                let score = self.person.map_or(d.score, |b| b.score.max(d.score));
-                runs.push(Run { score, in_box: self.person, found: d.window, view });
+                runs.push(Run { score: d.score, in_box: None, found: d.window, view });
             }
         }
-        let Some(PersonBox { bounds, score }) = self.person else { return Ok(runs) };
-        if let Some(run) = self.filling(runs, bounds) {
-            return Ok(vec![run]);
-        }
-        // The network expects the hips in the middle: of a whole person, or of one whose upper
-        // half is seen.
-        let [left, top, right, bottom] = bounds;
+        let Some(person) = self.person else {
+            runs.retain(|r| r.view.presence > PRESENT);
+            return Ok(runs);
+        };
+        // The network of landmarks expects the hips in the middle: of a whole person, or else of
+        // one whose upper half is seen.
+        let [left, top, right, bottom] = person.bounds;
         let upper = [left, top, right, 2.0 * bottom - top];
-        let mut all = Vec::new();
-        for whole in [bounds, upper] {
-            let window = Window { mirrored, ..square(whole, AROUND_ALL) };
+        for bounds in [person.bounds, upper] {
+            let window = Window { mirrored, ..square(bounds, AROUND_ALL) };
             let seen = twice(finder, photo, &window)?;
-            all.extend(seen.map(|view| Run {
-                score,
-                in_box: self.person,
+            runs.extend(seen.map(|view| Run {
+                score: 0.0,
+                in_box: None,
                 found: view.window,
                 view,
             }));
+            let filling: Vec<Run> =
+                runs.drain(..).filter_map(|run| self.filling(run, person)).collect();
+            if !filling.is_empty() {
+                return Ok(filling);
+            }
         }
-        Ok(self.filling(all, bounds).into_iter().collect())
+        Ok(runs)
     }
 
-    /// Returns the run of the person who fills a box.
-    fn filling(&self, runs: impl IntoIterator<Item = Run>, bounds: [f64; 4]) -> Option<Run> {
-        let fit = |r: &Run| overlap(r.view.bounds(self.size), bounds);
-        let fits = |r: &Run| r.view.presence > PRESENT && fit(r) > self.fills;
-        runs.into_iter().filter(fits).max_by(|a, b| fit(a).total_cmp(&fit(b)))
+    /// Returns a run as that of the person in a box, if that one fills it.
+    fn filling(&self, run: Run, person: PersonBox) -> Option<Run> {
+        let (fills, present) = match person.score {
+            Some(_) => (DETECTED, HIDDEN),
+            None => (DRAWN, PRESENT),
+        };
+        let fit = overlap(run.view.bounds(self.size), person.bounds);
+        let seen = fit > fills && run.view.presence > present;
+        let score = run.score.max(person.score.unwrap_or(1.0));
+        seen.then(|| Run { score, in_box: Some(person), ..run })
     }
 }
 

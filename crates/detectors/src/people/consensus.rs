@@ -8,6 +8,7 @@
 use super::landmarks::{NAMED, SeenLandmark, View};
 use super::person::{Hypothesis, Landmark, Person};
 use super::window::Window;
+use crate::boxes::overlap;
 
 /// Shoulders, elbows, wrists, hips, knees, ankles.
 const LIMBS: [usize; 12] = [11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28];
@@ -16,11 +17,16 @@ const NEAR: f64 = 0.3;
 /// Views with more agreement than this, 0 to 1, have the same pose.
 const AGREEING: f64 = 0.5;
 
+/// Landmarks in the whole picture with more overlap than this with a box are of the person in it.
+const FILLED: f64 = 0.3;
+/// Two people whose boxes overlap by more than this are one.
+const ONE: f64 = 0.6;
+
 /// A view with the score and the window of its detection.
 #[derive(Clone, Debug)]
 pub(super) struct Run {
     pub score: f64,
-    /// The box in which this person was looked for, if it was in one.
+    /// The box that the person fills, if one was said to be there.
     pub in_box: Option<PersonBox>,
     pub found: Window,
     pub view: View,
@@ -31,35 +37,38 @@ pub(super) struct Run {
 pub(super) struct PersonBox {
     /// Left, top, right and bottom, in pixels.
     pub bounds: [f64; 4],
-    /// How likely it is one, 0 to 1.
-    pub score: f64,
+    /// How likely a detector takes it to be one, 0 to 1; `None` if a user drew it.
+    pub score: Option<f64>,
 }
 
-impl Run {
-    /// Returns the confidence that this is a person: the presence of landmarks, at most what a
-    /// detector says. Where only the first network sees somebody, it is often wrong, and is
-    /// half believed (docs/measurements/detectors.md).
-    pub fn sure(&self) -> f64 {
-        self.view.presence.min(self.in_box.map_or(0.5 * self.score, |b| b.score))
-    }
-}
-
-/// Groups runs by person: those in the same box, and windows at about the same position and of
-/// about the same size. People are in the order of their first run.
-pub(super) fn by_person(runs: Vec<Run>) -> Vec<Vec<Run>> {
+/// Groups runs in a photograph of some size by person: those in the same box, or which fill it;
+/// others, if their windows are at about the same position and of about the same size. People
+/// are in the order of their first run.
+pub(super) fn by_person(mut runs: Vec<Run>, size: [f64; 2]) -> Vec<Vec<Run>> {
+    runs.sort_by_key(|r| r.in_box.is_none());
     let mut people: Vec<Vec<Run>> = Vec::new();
     for run in runs {
-        let boxed = |p: &Vec<Run>| run.in_box.is_some() && p.iter().any(|r| r.in_box == run.in_box);
+        let boxed = |p: &&Vec<Run>| run.in_box.is_some() && p[0].in_box == run.in_box;
+        let fit = |p: &Vec<Run>| {
+            let bounds = p[0].in_box.filter(|_| run.in_box.is_none())?.bounds;
+            Some(overlap(run.view.bounds(size), bounds)).filter(|fit| *fit > FILLED)
+        };
         let near = |p: &Vec<Run>| {
             let (centre, side) = middle(p);
             let apart = distance(run.found.centre, centre);
-            apart < 0.25 * side.min(run.found.side)
+            p[0].in_box.is_none()
+                && run.in_box.is_none()
+                && apart < 0.25 * side.min(run.found.side)
                 && run.found.side < 2.0 * side
                 && side < 2.0 * run.found.side
         };
-        let at = people.iter().position(boxed).or_else(|| people.iter().position(near));
-        match at.map(|i| &mut people[i]) {
-            Some(person) => person.push(run),
+        let filled = || {
+            let fits = people.iter().enumerate().filter_map(|(i, p)| Some((i, fit(p)?)));
+            fits.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+        };
+        let at = people.iter().position(|p| boxed(&p)).or_else(filled);
+        match at.or_else(|| people.iter().position(near)) {
+            Some(i) => people[i].push(run),
             None => people.push(vec![run]),
         }
     }
@@ -86,6 +95,21 @@ pub(super) fn seen(runs: &[Run], size: (u32, u32)) -> f64 {
 pub(super) fn prominence(middle: [f64; 2], side: f64, (width, height): (u32, u32)) -> f64 {
     let off = libm::hypot(middle[0] / f64::from(width) - 0.5, middle[1] / f64::from(height) - 0.5);
     side / f64::from(width.max(height)) * libm::exp(-2.0 * off)
+}
+
+/// Returns the confidence that the runs of a person see one, whose consensus has these bounds: in a
+/// detector's box its score, at most halved where the person does not fill it; in a box that a
+/// user drew the presence of landmarks. Elsewhere also at most half the score of the first
+/// network, which often errs (docs/measurements/detectors.md).
+pub(super) fn sure(runs: &[Run], bounds: [f64; 4]) -> f64 {
+    let each = |r: &Run| match r.in_box {
+        Some(PersonBox { bounds: around, score: Some(score) }) => {
+            0.5 * score * (1.0 + overlap(bounds, around))
+        }
+        Some(_) => r.view.presence,
+        None => r.view.presence.min(0.5 * r.score),
+    };
+    runs.iter().map(each).fold(0.0, f64::max)
 }
 
 /// The detection on which the views of a person agree.
@@ -146,7 +170,8 @@ fn agreement(a: &View, b: &View, torso: f64) -> f64 {
 
 /// Returns whether two people are one who was found twice.
 pub(super) fn same(a: &Person, b: &Person) -> bool {
-    likeness(|i| distance(a.landmarks[i].at, b.landmarks[i].at) / a.torso) > AGREEING
+    let alike = likeness(|i| distance(a.landmarks[i].at, b.landmarks[i].at) / a.torso);
+    alike > AGREEING || overlap(a.bounds, b.bounds) > ONE
 }
 
 /// Returns how alike two poses are, 0 to 1, whose landmarks have some distances in torsos.

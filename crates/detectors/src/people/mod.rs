@@ -21,11 +21,11 @@ mod window;
 
 pub use person::{Hypothesis, Landmark, Person};
 
-use crate::boxes::around;
+use crate::boxes::{around, overlap};
 use crate::nn::{Network, NetworkError};
-use crate::objects::FoundObject;
-use area::{Area, DETECTED, DRAWN};
-use consensus::{PersonBox, Run, by_person, consensus, prominence, same, seen};
+use crate::objects::{FoundObject, VIEWS, View as ObjectView};
+use area::Area;
+use consensus::{PersonBox, Run, by_person, consensus, prominence, same, seen, sure};
 use landmarks::View;
 use pcadlang_numerics::platform::threads::side_by_side;
 use pcadlang_scene::vision::Photo;
@@ -36,15 +36,25 @@ use window::Window;
 const PADDINGS: [f64; 4] = [0.0, 0.3, 0.15, 0.5];
 /// The maximum longer side that is processed; larger pictures are shrunk first.
 const LONGEST: u32 = 1280;
-/// Objects with a higher score than this are looked at as people.
-const SAID: f64 = 0.25;
-/// If a run has a presence above this, runs with a lower one are ignored.
+/// The minimum presence of landmarks where no detector says that somebody is there.
 const PRESENT: f64 = 0.5;
+/// The part of the minimum confidence that others need where somebody is seen: people come in
+/// company, and a picture without anyone has nobody.
+const IN_COMPANY: f64 = 0.75;
+/// The pose of somebody whose box is this part of the picture is that of the views of the whole
+/// picture, where there are any: such boxes often leave out a part.
+const LARGE: f64 = 0.6;
+/// Boxes of a detector that overlap by more than this are of one person.
+const ONE: f64 = 0.6;
+
+/// The views of a photograph in which boxes of people are looked for.
+pub const VIEWS_OF_PEOPLE: &[ObjectView] = VIEWS.split_at(4).0;
 
 /// Where to look for people.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Search<'a> {
-    /// In the whole photograph, and in the boxes of a detector of people.
+    /// In the whole photograph, and in the boxes of a detector of people, which may see each of
+    /// them in several views, those with the highest scores first.
     Everywhere(&'a [FoundObject]),
     /// In one box, left, top, right and bottom in pixels, for the person who fills it.
     Within([f64; 4]),
@@ -60,7 +70,8 @@ pub struct FindOptions {
     pub most: usize,
     /// Minimum score of detections, 0 to 1.
     pub least: f64,
-    /// Minimum confidence that something is a person, 0 to 1 ([`Person::sure`]).
+    /// Minimum confidence that somebody is in the picture, 0 to 1 ([`Person::sure`]); others need
+    /// less.
     pub sure: f64,
 }
 
@@ -115,13 +126,17 @@ impl PeopleFinder {
             |bounds: [f64; 4], score| PersonBox { bounds: bounds.map(|x| x / scale), score };
         let areas: Vec<Area> = match search {
             Search::Within(bounds) => {
-                paddings.map(|p| Area::around(in_box(bounds, 1.0), DRAWN, size, p)).collect()
+                paddings.map(|p| Area::around(in_box(bounds, None), size, p)).collect()
             }
             Search::Everywhere(objects) => {
                 let whole = paddings.map(|p| Area::whole(size, p));
                 let around =
-                    |o: &FoundObject| Area::around(in_box(o.bounds, o.score), DETECTED, size, 0.0);
-                let people = said_to_be_people(objects, (photo.width(), photo.height()));
+                    |o: &FoundObject| Area::around(in_box(o.bounds, Some(o.score)), size, 0.0);
+                let people = said_to_be_people(
+                    objects,
+                    IN_COMPANY * options.sure,
+                    (photo.width(), photo.height()),
+                );
                 whole.chain(people.into_iter().take(options.most).map(around)).collect()
             }
         };
@@ -135,27 +150,36 @@ impl PeopleFinder {
                 *runs = area.runs(self, looked_at, *mirrored, options);
             }
         });
-        let mut runs: Vec<Run> =
+        let runs: Vec<Run> =
             looked.into_iter().map(|(_, runs)| runs).collect::<Result<Vec<_>, _>>()?.concat();
-        if runs.iter().any(|r| r.view.presence > PRESENT) {
-            runs.retain(|r| r.view.presence > PRESENT);
-        }
-        let mut people: Vec<(f64, Vec<Run>)> =
-            by_person(runs).into_iter().map(|p| (seen(&p, size), p)).collect();
-        people.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let each = by_person(runs, [size.0, size.1].map(f64::from)).into_iter();
+        let mut people: Vec<Person> = each.filter_map(|runs| person(&runs, size, scale)).collect();
+        people.sort_by(|a, b| b.sure.total_cmp(&a.sure));
+        let least = match people.first() {
+            Some(p) if p.sure >= options.sure => IN_COMPANY * options.sure,
+            _ => options.sure,
+        };
+        people.retain(|p| p.sure >= least);
         let mut all: Vec<Person> = Vec::new();
-        for (score, runs) in people {
-            let person = person(score, runs, scale).filter(|p| p.sure >= options.sure);
-            all.extend(person.filter(|p| !all.iter().any(|other| same(other, p))));
+        for person in people {
+            if !all.iter().any(|other| same(other, &person)) {
+                all.push(person);
+            }
         }
+        all.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(all)
     }
 }
 
-/// Returns the people among objects in a photograph of this size, the most prominent first.
-fn said_to_be_people(objects: &[FoundObject], size: (u32, u32)) -> Vec<&FoundObject> {
-    let mut all: Vec<&FoundObject> =
-        objects.iter().filter(|o| o.name() == "person" && o.score > SAID).collect();
+/// Returns the people among objects, those with the highest scores first, each once, in a
+/// photograph of this size: those with at least some score, the most prominent first.
+fn said_to_be_people(objects: &[FoundObject], least: f64, size: (u32, u32)) -> Vec<&FoundObject> {
+    let mut all: Vec<&FoundObject> = Vec::new();
+    for o in objects.iter().filter(|o| o.name() == "person" && o.score >= least) {
+        if !all.iter().any(|other| overlap(other.bounds, o.bounds) > ONE) {
+            all.push(o);
+        }
+    }
     let prominence = |o: &FoundObject| {
         let [left, top, right, bottom] = o.bounds;
         let middle = [0.5 * (left + right), 0.5 * (top + bottom)];
@@ -165,13 +189,21 @@ fn said_to_be_people(objects: &[FoundObject], size: (u32, u32)) -> Vec<&FoundObj
     all
 }
 
-/// Combines the runs of a person, scaling pixels by `scale`. Where there are views of the whole
-/// picture, the pose is theirs: boxes err more often (docs/measurements/detectors.md).
-fn person(score: f64, all: Vec<Run>, scale: f64) -> Option<Person> {
-    let sure = all.iter().map(Run::sure).fold(0.0, f64::max);
-    let (whole, boxed): (Vec<Run>, Vec<Run>) = all.into_iter().partition(|r| r.in_box.is_none());
-    let runs = if whole.is_empty() { boxed } else { whole };
-    let mut c = consensus(&runs)?;
+/// Combines the runs of a person in a picture of some size, scaling pixels by `scale`.
+fn person(all: &[Run], size: (u32, u32), scale: f64) -> Option<Person> {
+    let longer = |[left, top, right, bottom]: [f64; 4]| (right - left).max(bottom - top);
+    let large = LARGE * f64::from(size.0.max(size.1));
+    let in_large_box = |r: &Run| r.in_box.is_some_and(|b| longer(b.bounds) >= large);
+    let mut runs = all.to_vec();
+    if runs.iter().any(|r| r.in_box.is_none()) {
+        runs.retain(|r| !in_large_box(r));
+    }
+    let runs = &runs;
+    let mut c = consensus(runs)?;
+    let inside = |l: &Landmark| {
+        [l.at[0].clamp(0.0, f64::from(size.0)), l.at[1].clamp(0.0, f64::from(size.1))]
+    };
+    let sure = sure(all, around(c.landmarks.iter().map(inside)));
     let poses = c.others.iter_mut().map(|h| &mut h.landmarks).chain([&mut c.landmarks]);
     for l in poses.flatten() {
         l.at = l.at.map(|x| x * scale);
@@ -183,7 +215,7 @@ fn person(score: f64, all: Vec<Run>, scale: f64) -> Option<Person> {
         (Window { centre, side: window.side * scale, ..*window }, mask.clone())
     };
     Some(Person {
-        score,
+        score: seen(all, size),
         sure,
         bounds: around(c.landmarks.iter().map(|l| l.at)),
         torso: c.torso * scale,

@@ -34,8 +34,9 @@ pub struct Person {
     /// Prominence of the person in the picture: the larger, the more often and
     /// confidently they are seen, the larger they are, and the nearer to the middle.
     pub score: f64,
-    /// Confidence that this is a person, 0 to 1: the smaller of both networks'
-    /// confidences, in the view where that is largest.
+    /// Confidence that this is a person, 0 to 1, in the view where that is largest: a
+    /// detector's score, less where landmarks do not fill its box; without a detector, at most
+    /// a half.
     pub sure: f64,
     /// Left, top, right and bottom of all landmarks, in pixels.
     pub bounds: [f64; 4],

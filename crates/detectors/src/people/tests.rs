@@ -137,7 +137,7 @@ fn runs_of_one_person_are_together() {
         run([104.0, 97.0], 42.0, 0.0),
         run([100.0, 100.0], 150.0, 0.0),
     ];
-    let sizes: Vec<usize> = by_person(all).iter().map(Vec::len).collect();
+    let sizes: Vec<usize> = by_person(all, [400.0, 300.0]).iter().map(Vec::len).collect();
     assert_eq!(sizes, [2, 1, 1], "apart, and not of one size");
 }
 

@@ -11,17 +11,6 @@ use std::sync::Arc;
 /// programs choose among them.
 const LEAST: f64 = 0.01;
 
-/// The views in which objects are looked for where a box that is missed or off costs more than
-/// the time: the larger an object is in the picture, the smaller the view that shows it as the
-/// network knows its kind (docs/measurements/objects.md).
-pub(super) const VIEWS: [View; 6] = {
-    const fn seen(part: f64) -> [View; 2] {
-        [View { part, mirrored: false }, View { part, mirrored: true }]
-    }
-    let ([a, b], [c, d], [e, f]) = (seen(1.0), seen(0.67), seen(0.55));
-    [a, b, c, d, e, f]
-};
-
 /// The key of the objects prepared from views of a photograph.
 #[derive(Clone, PartialEq)]
 struct Viewed(Vec<View>);
@@ -62,21 +51,7 @@ pub(super) fn found(image: &ImageValue, views: &[View]) -> Result<Arc<Vec<FoundO
         let fault = |why: String| Fault::new(FaultKind::Other, format!("scene.objects: {why}"));
         let options = ObjectOptions { least: LEAST, most: usize::MAX };
         let finder = networks::finder().map_err(|why| fault(why.into()))?;
-        let seen: Vec<_> = std::thread::scope(|scope| {
-            let begin = |view: &View| {
-                let (view, options) = (*view, &options);
-                scope.spawn(move || finder.find(photo, view, options))
-            };
-            let running: Vec<_> = views.iter().map(begin).collect();
-            running.into_iter().map(|r| r.join()).collect()
-        });
-        let mut all = Vec::new();
-        for found in seen {
-            let found = found.map_err(|_| fault("a thread failed".into()))?;
-            all.extend(found.map_err(|e| fault(e.to_string()))?);
-        }
-        all.sort_by(|a, b| b.score.total_cmp(&a.score));
-        Ok(all)
+        finder.find_in_views(photo, views, &options).map_err(|e| fault(e.to_string()))
     })
 }
 

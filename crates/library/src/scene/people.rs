@@ -5,8 +5,7 @@ use super::hint::{self, HINT};
 use super::observed::{KeypointsValue, MaskValue, PeopleKey};
 use super::{IMAGE, ImageValue, native};
 use pcadlang_detectors::boxes::{contains, sides};
-use pcadlang_detectors::objects::View;
-use pcadlang_detectors::people::{FindOptions, Person, Search, networks};
+use pcadlang_detectors::people::{FindOptions, Person, Search, VIEWS_OF_PEOPLE, networks};
 use pcadlang_engine::lang::builtins::{Row, Type, arg, int};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
@@ -101,7 +100,7 @@ impl ImageValue {
             let finder = networks::finder().map_err(|why| fault(why.into()))?;
             let objects = match key.within {
                 Some(_) => Arc::default(),
-                None => found(self, &[View::WHOLE])?,
+                None => found(self, VIEWS_OF_PEOPLE)?,
             };
             let search = key.within.map_or(Search::Everywhere(&objects), Search::Within);
             let found = finder.find(photo, search, &options, 0);

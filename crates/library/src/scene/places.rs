@@ -2,9 +2,9 @@
 //! the boxes of a detector, or in regions that are nearly mirror-symmetric.
 
 use super::ImageValue;
-use super::found_objects::{VIEWS, found};
+use super::found_objects::found;
 use pcadlang_detectors::boxes::{contains, overlap, sides};
-use pcadlang_detectors::objects::FoundObject;
+use pcadlang_detectors::objects::{FoundObject, VIEWS};
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_scene::vision::candidates::{Axis, Candidate, CandidateOptions, candidates, enclosed};
 use pcadlang_scene::vision::segmentation::{Guess, Method, from_mask, guesses};

@@ -2,8 +2,9 @@
 //! and before anything is sampled.
 
 use super::ImageValue;
-use super::found_objects::{VIEWS, found};
+use super::found_objects::found;
 use super::places::{Place, boxes, sized};
+use pcadlang_detectors::objects::VIEWS;
 use pcadlang_detectors::people::Person;
 use pcadlang_engine::lang::error::Fault;
 use pcadlang_scene::vision::candidates::CandidateOptions;
