@@ -66,3 +66,27 @@ fn a_box_is_the_only_place_looked_at() {
     assert_eq!(said, "1 person");
     assert!(people["annotations"][0]["bbox"][0].as_f64().unwrap() > f64::from(width));
 }
+
+/// Two skiers beside each other: both are found at once, and each stands where the networks see
+/// them; on one plane, they are of about one size.
+#[test]
+fn people_are_where_they_are_seen_on_one_ground() {
+    let f = Folder::new("people_two");
+    let skier = image::open(SKIER).unwrap().to_rgb8();
+    let (width, height) = skier.dimensions();
+    let twice = |x: u32, y| *skier.get_pixel(x % width, y);
+    f.write("two.png", png(image::RgbImage::from_fn(2 * width, height, twice)));
+    let run = ["run", "people.pcad", "--observe", "two.png", "--set", "ground=true", "--out", "o"];
+    f.succeeds(&[&run[..], &["--steps", "20", "--warmup", "20", "--chains", "1"]].concat());
+    let trace = json(&f, "o/best.trace.json").to_string();
+    assert!(trace.contains("floor/plane/height"), "{trace}");
+    let mask = image::open(f.path().join("o/mask.png")).unwrap().to_luma8();
+    let covered = |of: std::ops::Range<u32>| {
+        let on = mask.enumerate_pixels().filter(|(x, _, p)| of.contains(x) && p.0[0] > 127);
+        on.count() as f64
+    };
+    let (left, right) = (covered(0..mask.width() / 2), covered(mask.width() / 2..mask.width()));
+    let all = f64::from(mask.width() * mask.height());
+    assert!(left > 0.03 * all && right > 0.03 * all, "{left} {right} of {all}");
+    assert!((left / right).ln().abs() < 0.4, "{left} {right}");
+}

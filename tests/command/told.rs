@@ -292,3 +292,13 @@ fn the_search_of_a_preset_ends() {
         assert_eq!((warmup, steps), (fast, 1));
     }
 }
+
+#[test]
+fn a_table_without_a_vessel_says_so() {
+    let f = Folder::new("told_table");
+    let skier = "examples/images/skier.jpg";
+    std::fs::copy(skier, f.path().join("skier.jpg")).unwrap();
+    let done = f.run(&["run", "table.pcad", "--observe", "skier.jpg"]);
+    assert_eq!(done.code, 1);
+    assert!(done.err.contains("not found: no vessel is seen; --at X,Y"), "{}", done.err);
+}

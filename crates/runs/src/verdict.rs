@@ -36,7 +36,7 @@ const NOT_FOUND: [f64; 3] = [0.7, 0.9, 0.2];
 /// A person was found if the networks' confidence, and the overlap of the body with their mask of
 /// the person, are at least these, half of the body's joints are in the picture, and most views
 /// agree.
-const PERSON: [f64; 2] = [0.43, 0.55];
+const PERSON: [f64; 2] = [0.45, 0.55];
 /// A person was not found if the overlap is below this.
 const NO_PERSON: f64 = 0.25;
 

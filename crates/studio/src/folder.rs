@@ -258,4 +258,28 @@ mod tests {
         assert_eq!(all["cases"][1]["doubt"], 0.5);
         std::fs::remove_dir_all(f.path()).unwrap();
     }
+    #[test]
+    fn cases_are_in_the_order_of_doubt() {
+        let f = folder("gallery");
+        let put = |name: &str, text: Value| {
+            std::fs::create_dir_all(f.path().join(format!("e/{name}"))).unwrap();
+            std::fs::write(f.path().join(format!("e/{name}/run.json")), text.to_string()).unwrap();
+        };
+        let found = |verdict: &str, fit: f64| json!({ "found": { "verdict": verdict, "fit": fit } });
+        put("good", found("found", 0.9));
+        put("fair", found("found", 0.8));
+        put("perhaps", found("perhaps found", 0.95));
+        put("nobody", json!({ "found": { "verdict": "not found" } }));
+        put("chains", json!({ "agreement": 0.5 }));
+        let row = |name: &str, status: &str| json!({ "case": name, "status": status });
+        let names = ["good", "chains", "fair", "perhaps", "broken", "nobody"];
+        let rows = names.map(|n| row(n, if n == "broken" { "failed" } else { "done" }));
+        let all = json!({ "cases": rows }).to_string();
+        std::fs::write(f.path().join("e").join(MARK), all).unwrap();
+        let cases = f.evaluation("e").unwrap();
+        let order: Vec<&str> =
+            cases["cases"].as_array().unwrap().iter().map(|c| c["name"].as_str().unwrap()).collect();
+        assert_eq!(order, ["broken", "nobody", "chains", "perhaps", "fair", "good"]);
+        std::fs::remove_dir_all(f.path()).unwrap();
+    }
 }
