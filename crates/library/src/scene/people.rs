@@ -38,7 +38,7 @@ pub(super) const TABLE: &[Row] = &[native(
     ],
     Type::Array,
     "The people in a photograph, the most prominent first, in the whole of it and in the boxes \
-     where `scene.objects` sees people. With a box (or else a mask or an outline) in the hint, only \
+     of a detector, which sees it in four views. With a box (or else a mask or an outline) in the hint, only \
      whoever fills it; with positions `at`, first those at most of them, and last those at its \
      positions `not`: an error if there is nobody. Each is a record: `keypoints`, 33 joints, with \
      alternative positions where views disagree; `landmarks`, by name `at`, `spread` over agreeing \
