@@ -265,7 +265,8 @@ mod tests {
             std::fs::create_dir_all(f.path().join(format!("e/{name}"))).unwrap();
             std::fs::write(f.path().join(format!("e/{name}/run.json")), text.to_string()).unwrap();
         };
-        let found = |verdict: &str, fit: f64| json!({ "found": { "verdict": verdict, "fit": fit } });
+        let found =
+            |verdict: &str, fit: f64| json!({ "found": { "verdict": verdict, "fit": fit } });
         put("good", found("found", 0.9));
         put("fair", found("found", 0.8));
         put("perhaps", found("perhaps found", 0.95));
@@ -277,8 +278,12 @@ mod tests {
         let all = json!({ "cases": rows }).to_string();
         std::fs::write(f.path().join("e").join(MARK), all).unwrap();
         let cases = f.evaluation("e").unwrap();
-        let order: Vec<&str> =
-            cases["cases"].as_array().unwrap().iter().map(|c| c["name"].as_str().unwrap()).collect();
+        let order: Vec<&str> = cases["cases"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|c| c["name"].as_str().unwrap())
+            .collect();
         assert_eq!(order, ["broken", "nobody", "chains", "perhaps", "fair", "good"]);
         std::fs::remove_dir_all(f.path()).unwrap();
     }
