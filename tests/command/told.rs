@@ -91,19 +91,18 @@ fn another_programs_run_is_kept() {
     f.succeeds(&["run", "coin.pcad", "--quiet", "--out", "out"]);
     let before = f.read("out/run.json");
     let other = ["run", "other.pcad", "--quiet", "--out", "out"];
-    let d = f.run(&other);
-    assert_eq!(d.code, 1, "{}", d.err);
-    assert!(
-        d.err.contains("out holds a run of coin.pcad") && d.err.contains("--overwrite"),
-        "{}",
-        d.err
-    );
-    assert_eq!(f.read("out/run.json"), before);
-    // The same program, changed or not, is run again as before.
-    f.write("coin.pcad", COIN.replace("beta(bias, 1)", "beta(bias, 2)"));
-    f.succeeds(&["run", "coin.pcad", "--quiet", "--out", "out"]);
-    f.succeeds(&[&other[..], &["--overwrite"]].concat());
+    let d = f.succeeds(&other);
+    assert!(d.err.contains("out holds a run of coin.pcad, which is now in out.coin"), "{}", d.err);
+    assert_eq!(f.read("out.coin/run.json"), before);
     assert_eq!(json(&f, "out/run.json")["program"], "other.pcad");
+    // The same program, changed or not, is run again as before.
+    f.write("other.pcad", COIN.replace("beta(bias, 1)", "beta(bias, 2)"));
+    f.succeeds(&other);
+    assert!(!f.exists("out.other"));
+    f.succeeds(&["run", "coin.pcad", "--quiet", "--out", "out", "--overwrite"]);
+    assert!(!f.exists("out.other"));
+    f.succeeds(&other);
+    assert!(f.exists("out.coin-2/run.json"));
 }
 
 /// In a terminal the user is asked.

@@ -236,18 +236,7 @@ fn a_run_leaves_where_the_joints_are() {
     assert!(overlay.pixels().any(|p| p.0 == [255, 220, 0]), "its landmarks are drawn");
 
     f.write("ball.pcad", "include \"std/scene.pcad\" as scene; assume r ~ uniform(0.5, 1); let view = scene.render(scene.sphere(r)); observe normal(r, 0.1) = 0.7;");
-    f.succeeds(&[
-        "run",
-        "ball.pcad",
-        "--steps",
-        "10",
-        "--warmup",
-        "10",
-        "--quiet",
-        "--out",
-        "a",
-        "--overwrite",
-    ]);
+    f.succeeds(&["run", "ball.pcad", "--steps", "10", "--warmup", "10", "--quiet", "--out", "a"]);
     assert!(!f.exists("a/keypoints.json"), "nothing of an earlier run stays");
 }
 

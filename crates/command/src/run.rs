@@ -71,22 +71,30 @@ pub fn run(a: &Run) -> Result<(), Failure> {
     }
 }
 
-/// Makes sure that the run of another program in a folder may be replaced: the user says so,
-/// by an option or when asked in a terminal.
+/// Makes sure that the run of another program in a folder is not lost: in a terminal the user says
+/// whether it may be replaced, elsewhere it gets a folder of its own.
 fn replaces(path: &Path, program: &str, overwrite: bool, asks: bool) -> Result<(), Failure> {
     let Some(other) = resume::other_program(path, program).filter(|_| !overwrite) else {
         return Ok(());
     };
     let said = format!("{} holds a run of {other}", path.display());
+    let hint = "choose another folder with --out, or replace it with --overwrite";
     if asks && std::io::stdin().is_terminal() && term::is_live() {
         error_text!("{said}: replace it? [y/N] ");
         let mut answer = String::new();
         let _ = std::io::stdin().read_line(&mut answer);
-        if matches!(answer.trim(), "y" | "Y" | "yes") {
-            return Ok(());
-        }
+        return match answer.trim() {
+            "y" | "Y" | "yes" => Ok(()),
+            _ => Err(plain(said).hint(hint)),
+        };
     }
-    Err(plain(said).hint("choose another folder with --out, or replace it with --overwrite"))
+    let name = format!("{}.{}", path.display(), job::stem(&other));
+    let numbered = (2..).map(|n| format!("{name}-{n}"));
+    let free = std::iter::once(name.clone()).chain(numbered).find(|n| !Path::new(n).exists());
+    let aside = free.unwrap_or(name);
+    std::fs::rename(path, &aside).map_err(|e| plain(format!("{said}: {e}")).hint(hint))?;
+    error_line!("note: {said}, which is now in {aside}");
+    Ok(())
 }
 
 /// Returns whether some chain made no step, although the plan has kernels and there are choices

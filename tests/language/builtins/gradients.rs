@@ -304,6 +304,7 @@ fn cases() -> Vec<E> {
     let bools = Fixed(bools(&[true, false, true, false]));
     all.extend([
         Call("clamp", vec![vector(&[-0.3, 0.4, 2.0]), by(0.1), by(0.9)]),
+        Call("require", vec![by(0.4), Fixed(Value::Bool(true)), Fixed(Value::str("never"))]),
         Call("dot", vec![xs(), vector(&[1.0, 0.3, -0.2, 0.6])]),
         Call("linspace", vec![by(0.3), by(1.7), whole(5.0)]),
         Call("range", vec![by(0.3), Fixed(num(2.1)), by(0.5)]),
