@@ -278,6 +278,20 @@ fn two(weights: &[[f32; 8]; 4]) -> (Vec<u8>, Value) {
     (w.document(&mut d), d)
 }
 
+/// The node of a skinned mesh places no vertex, but a mirrored one turns its faces.
+#[test]
+fn a_mirrored_node_turns_a_skinned_mesh() {
+    let row = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let (bytes, mut d) = two(&[row; 4]);
+    let plain = read(&files::packed(&d, &bytes)).unwrap();
+    d["nodes"][0]["scale"] = json!([1, -1, 1]);
+    let mirrored = read(&files::packed(&d, &bytes)).unwrap();
+    assert_eq!(mirrored.positions, plain.positions);
+    let turned: Vec<[u32; 3]> = plain.triangles[..2].iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+    assert_eq!(mirrored.triangles[..2], turned);
+    assert_eq!(mirrored.triangles[2..], plain.triangles[2..], "the hat and the floor as before");
+}
+
 #[test]
 fn skins_are_put_in_order() {
     let row = [0.1, 0.2, 0.3, 0.0, 0.25, 0.15, 0.0, 0.0];

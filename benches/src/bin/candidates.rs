@@ -27,7 +27,7 @@ fn look(folder: &Path, options: &CandidateOptions) -> Result<Outcome, String> {
     let read = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
     let (limits, image, truth) = (Limits::default(), read("image.png")?, read("mask.png")?);
     let photo = photo::decode(&image, &limits).map_err(|e| e.to_string())?;
-    let truth = mask::decode(&truth, &limits).map_err(|e| e.to_string())?;
+    let truth = mask::decode(&truth, None, &limits).map_err(|e| e.to_string())?;
     let start = Instant::now();
     let found = candidates(&photo, options);
     let seconds = start.elapsed().as_secs_f64();

@@ -104,7 +104,7 @@ fn cases(s: &Settings) -> Result<Vec<Case>, String> {
 
 fn read_mask(path: &Path) -> Result<Mask, String> {
     let bytes = std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
-    mask::decode(&bytes, &Limits::default()).map_err(|e| e.to_string())
+    mask::decode(&bytes, None, &Limits::default()).map_err(|e| e.to_string())
 }
 
 /// The outline of the component of the first pixel of a mask: the corners between pixels,

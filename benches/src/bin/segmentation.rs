@@ -62,7 +62,7 @@ fn look(folder: &Path) -> Result<[Vec<[f64; NAMES.len()]>; 3], String> {
     let read = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
     let (limits, image, truth) = (Limits::default(), read("image.png")?, read("mask.png")?);
     let photo = photo::decode(&image, &limits).map_err(|e| e.to_string())?;
-    let truth = mask::decode(&truth, &limits).map_err(|e| e.to_string())?;
+    let truth = mask::decode(&truth, None, &limits).map_err(|e| e.to_string())?;
     let [x0, y0, x1, y1] = truth.bounds().ok_or("an empty mask")?;
     let hint = |off: [f64; 4]| {
         let (w, h) = (x1 - x0, y1 - y0);

@@ -63,7 +63,7 @@ impl HintArgs {
     /// If the mask cannot be read, or the axis is not two ends and a width.
     pub fn read(&self) -> Result<Hint, Failure> {
         let mask = self.mask.as_ref().map(|path| {
-            mask::decode(&files::read(path)?, &Limits::default())
+            mask::decode(&files::read(path)?, None, &Limits::default())
                 .map_err(|e| plain(format!("{}: {e}", path.display())))
         });
         Ok(Hint {

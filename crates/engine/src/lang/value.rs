@@ -101,6 +101,10 @@ pub trait Object: Any + fmt::Debug + Send + Sync {
     fn summary(&self) -> Option<String> {
         None
     }
+    /// Returns what users should know of it if it was read from a file, such as that it is empty.
+    fn remark(&self) -> Option<String> {
+        None
+    }
     /// Returns the approximate count of numbers that it alone holds, if that is large.
     #[doc(hidden)]
     fn own_numbers(&self) -> usize {

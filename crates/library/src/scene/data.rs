@@ -17,8 +17,10 @@ use pcadlang_scene::vision::keypoints::{self, Keypoints, People};
 use pcadlang_scene::vision::{ContourMap, Limits, VisionError, depth, mask, npy, photo};
 use std::sync::Arc;
 
+const PATH: Arg = arg("file", Type::Str, "The path, relative to the program's folder.");
+
 const SHAPE: &[Arg] = &[
-    arg("file", Type::Str, "The path, relative to the program's folder."),
+    PATH,
     word("up", &["y", "x", "z"], "The file's up axis; it is rotated to +y."),
     num("unit", 1.0, "The length of the file's unit in scene units: 0.01 for centimetres.")
         .unit("m"),
@@ -72,15 +74,43 @@ pub(super) const TABLE: &[Row] = &[
         "A contour map: bright pixels are contour.",
         || Arc::new(Plain(contours)),
     ),
-    kind("mask", FILE, Type::Object("a mask"), "A mask: bright pixels are the object.", || {
-        Arc::new(Plain(mask))
-    }),
+    kind(
+        "mask",
+        &[
+            PATH,
+            opt(
+                "label",
+                Type::Int,
+                "none",
+                "The grey value, number or palette entry of the object.",
+            ),
+        ],
+        Type::Object("a mask"),
+        "A mask, a picture or `.npy`: bright pixels are the object; if there are none, those that \
+         are not 0, as in a palette (where 255 is \"void\" beside other entries).",
+        || Arc::new(MaskFile),
+    ),
     kind(
         "depth",
-        FILE,
+        &[
+            PATH,
+            num(
+                "missing",
+                0.0,
+                "The number that means \"not measured\", before scaling, like NaN.",
+            ),
+            opt(
+                "scale",
+                Type::Num,
+                "1000 for a picture, 1 for an array",
+                "How much of a number is one scene unit: 1000 for millimetres (Kinect, RealSense), \
+                 5000 for TUM's, 1000 over `depth_scale` for BOP's, in metres.",
+            ),
+        ],
         Type::Object("a depth map"),
-        "A depth map: `.npy`, or a 16-bit PNG in thousandths of a scene unit.",
-        || Arc::new(Plain(depth)),
+        "A depth map: `.npy`, or a grey PNG of 16 bits. 0 is not measured; `inf` is background, and \
+         so are negative numbers, and 0 if another number is `missing`.",
+        || Arc::new(DepthFile),
     ),
     DETECTOR,
     kind(
@@ -144,14 +174,76 @@ fn contours(bytes: &[u8], limits: &Limits) -> Result<Value, VisionError> {
         .map(|p| Value::object(ImageValue::contours(ContourMap::from_photo(&p), None)))
 }
 
-fn mask(bytes: &[u8], limits: &Limits) -> Result<Value, VisionError> {
-    mask::decode(bytes, limits).map(|m| Value::object(MaskValue::new(m)))
+/// A mask, of one label or of all.
+#[derive(Debug)]
+struct MaskFile;
+
+impl DataFormat for MaskFile {
+    fn load(
+        &self,
+        file: &str,
+        bytes: &[u8],
+        options: &Options,
+        _: &ReadRelative,
+    ) -> Result<Value, Fault> {
+        let label = number(options, "label").map(|n| n as u32);
+        mask::decode(bytes, label, &Limits::default())
+            .map(|m| Value::object(MaskValue::new(m)))
+            .map_err(|e| unreadable(file, &e.to_string()))
+    }
+
+    fn check_option(&self, _: &str, value: &Literal) -> Result<(), String> {
+        match value {
+            Literal::Num(n) if *n >= 0.0 && n.fract() == 0.0 && *n <= f64::from(u32::MAX) => Ok(()),
+            _ => Err("`label` must be a whole number of at least 0".into()),
+        }
+    }
+
+    fn example(&self) -> Option<&'static str> {
+        Some("mask(\"file.png\", label = 3)")
+    }
 }
 
-fn depth(bytes: &[u8], limits: &Limits) -> Result<Value, VisionError> {
-    // An array holds depths; a picture's whole numbers are thousandths.
-    let scale = if npy::is_npy(bytes) { 1.0 } else { 1000.0 };
-    depth::decode(bytes, scale, limits).map(|d| Value::object(DepthValue::new(d)))
+/// Depths, and the number that means that one was not measured.
+#[derive(Debug)]
+struct DepthFile;
+
+impl DataFormat for DepthFile {
+    fn load(
+        &self,
+        file: &str,
+        bytes: &[u8],
+        options: &Options,
+        _: &ReadRelative,
+    ) -> Result<Value, Fault> {
+        let usual = if npy::is_npy(bytes) { 1.0 } else { 1000.0 };
+        let scale = number(options, "scale").unwrap_or(usual);
+        let missing = number(options, "missing").unwrap_or(0.0);
+        depth::decode(bytes, scale, missing, &Limits::default())
+            .map(|d| Value::object(DepthValue::new(d)))
+            .map_err(|e| unreadable(file, &e.to_string()))
+    }
+
+    fn check_option(&self, name: &str, value: &Literal) -> Result<(), String> {
+        match (name, value) {
+            ("scale", Literal::Num(x)) if *x > 0.0 && x.is_finite() => Ok(()),
+            ("scale", _) => Err("`scale` must be a positive number".into()),
+            (_, Literal::Num(_)) => Ok(()),
+            _ => Err(format!("`{name}` must be a number")),
+        }
+    }
+
+    fn example(&self) -> Option<&'static str> {
+        Some("depth(\"file.png\", missing = 0, scale = 1000)")
+    }
+}
+
+/// The option of this name, if it is a number.
+fn number(options: &Options, name: &str) -> Option<f64> {
+    match options.get(name) {
+        Some(Literal::Num(x)) => Some(*x),
+        _ => None,
+    }
 }
 
 /// Contour detectors of builds that read none from files.

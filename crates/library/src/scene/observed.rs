@@ -384,6 +384,16 @@ impl Object for MaskValue {
         self
     }
 
+    fn remark(&self) -> Option<String> {
+        let on = self.mask.data().iter().filter(|on| **on).count();
+        let what = match on {
+            0 => "empty: no pixel is on the object",
+            n if n == self.mask.data().len() => "full: every pixel is on the object",
+            _ => return None,
+        };
+        Some(format!("the mask is {what}"))
+    }
+
     fn numbers(&self) -> Option<Vec<f64>> {
         Some(self.mask.data().iter().map(|m| f64::from(u8::from(*m))).collect())
     }
@@ -413,7 +423,16 @@ impl Object for DepthValue {
         self
     }
 
-    /// The depths; background is infinite.
+    fn remark(&self) -> Option<String> {
+        let all = self.depth.data();
+        let missing = all.iter().filter(|d| d.is_nan()).count();
+        (missing > 0).then(|| {
+            let n = all.len();
+            format!("{missing} of the {n} depths are taken as not measured: 0 (`missing`) or NaN")
+        })
+    }
+
+    /// The depths; background is infinite, NaN is not measured.
     fn numbers(&self) -> Option<Vec<f64>> {
         Some(self.depth.data().iter().map(|d| f64::from(*d)).collect())
     }

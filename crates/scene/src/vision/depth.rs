@@ -68,14 +68,22 @@ impl DepthMap {
     }
 }
 
-/// Reads a depth map from bytes: a grey PNG (16 or 8 bit; depth = value / `scale`, 0 is background)
-/// or a `.npy` array of two axes (depth = value / `scale`; 0, negative and `inf` are
-/// background, NaN is missing).
-pub fn decode(bytes: &[u8], scale: f64, limits: &Limits) -> Result<DepthMap, VisionError> {
+/// Reads a depth map from bytes: a grey PNG of 16 bits or a `.npy` array of two axes. A depth is a
+/// value over `scale`; `missing` and NaN are not measured, as sensors and data sets have it; other
+/// values of 0 and below, and `inf`, are background.
+///
+/// # Errors
+/// If the bytes cannot be read, or hold no depths; a scale that is not positive.
+pub fn decode(
+    bytes: &[u8],
+    scale: f64,
+    missing: f64,
+    limits: &Limits,
+) -> Result<DepthMap, VisionError> {
     if !(scale > 0.0 && scale.is_finite()) {
         return Err(VisionError::Range { name: "scale", rule: "positive", value: scale });
     }
-    let depth = |v: f64| (v / scale) as f32;
+    let depth = |v: f64| if v == missing { f32::NAN } else { (v / scale) as f32 };
     if npy::is_npy(bytes) {
         let array = npy::parse(bytes)?;
         let (width, height) = array.picture_size()?;
@@ -88,19 +96,14 @@ pub fn decode(bytes: &[u8], scale: f64, limits: &Limits) -> Result<DepthMap, Vis
     }
     let (picture, _) = decode_dynamic(bytes, limits)?;
     let (width, height) = (picture.width(), picture.height());
-    let data = match picture {
-        image::DynamicImage::ImageLuma16(p) => {
-            p.pixels().map(|p| depth(f64::from(p.0[0]))).collect()
-        }
-        image::DynamicImage::ImageLuma8(p) => {
-            p.pixels().map(|p| depth(f64::from(p.0[0]))).collect()
-        }
-        _ => {
-            return Err(VisionError::Damaged(
-                "a depth map must be a greyscale picture with 16 or 8 bits, but this one has colours".into(),
-            ));
-        }
+    let image::DynamicImage::ImageLuma16(picture) = picture else {
+        return Err(VisionError::Damaged(
+            "a depth map must be a grey picture of 16 bits, or a .npy array; fewer bits, or \
+             colours, are a picture of depths, without their unit"
+                .into(),
+        ));
     };
+    let data = picture.pixels().map(|p| depth(f64::from(p.0[0]))).collect();
     DepthMap::new(width, height, data)
 }
 
@@ -421,12 +424,30 @@ mod tests {
         let mut png = std::io::Cursor::new(Vec::new());
         image::DynamicImage::ImageLuma16(grey).write_to(&mut png, image::ImageFormat::Png).unwrap();
         let limits = Limits::default();
-        let map = decode(png.get_ref(), 4096.0, &limits).unwrap();
-        assert_eq!(map.data(), [INF, 2.0]);
-        assert!(decode(png.get_ref(), 0.0, &limits).is_err());
+        let map = decode(png.get_ref(), 4096.0, 0.0, &limits).unwrap();
+        assert!(map.data()[0].is_nan() && map.data()[1] == 2.0, "0 is not measured");
+        let map = decode(png.get_ref(), 4096.0, f64::NAN, &limits).unwrap();
+        assert_eq!(map.data(), [INF, 2.0], "unless nothing is missing");
+        let map = decode(png.get_ref(), 4096.0, 8192.0, &limits).unwrap();
+        assert!(map.data()[0] == INF && map.data()[1].is_nan());
+        assert!(decode(png.get_ref(), 0.0, 0.0, &limits).is_err());
+        let mut bits = std::io::Cursor::new(Vec::new());
+        let grey = image::GrayImage::from_raw(2, 1, vec![0, 200]).unwrap();
+        image::DynamicImage::from(grey).write_to(&mut bits, image::ImageFormat::Png).unwrap();
+        assert!(decode(bits.get_ref(), 1000.0, 0.0, &limits).is_err(), "8 bits are no depths");
         let body: Vec<u8> =
             [0.0f32, -1.0, 3.0, f32::NAN].iter().flat_map(|v| v.to_le_bytes()).collect();
-        let map = decode(&npy::bytes_of(1, "<f4", "False", "(2, 2)", &body), 1.0, &limits).unwrap();
+        let map = decode(&npy::bytes_of(1, "<f4", "False", "(2, 2)", &body), 1.0, -1.0, &limits);
+        let map = map.unwrap();
+        assert!(map.data()[0] == INF && map.data()[1].is_nan() && map.data()[2] == 3.0);
+        let wide: Vec<u8> = [0u16, 65_535].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let wide = npy::bytes_of(1, "<u2", "False", "(1, 2)", &wide);
+        assert_eq!(decode(&wide, 65.535, 0.0, &limits).unwrap().data()[1], 1000.0);
+        let body: Vec<u8> =
+            [0.0f32, -1.0, 3.0, f32::NAN].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let map =
+            decode(&npy::bytes_of(1, "<f4", "False", "(2, 2)", &body), 1.0, f64::NAN, &limits);
+        let map = map.unwrap();
         assert!(map.data()[..3] == [INF, INF, 3.0] && map.data()[3].is_nan());
         let big = map.resized(4, 4);
         assert_eq!(

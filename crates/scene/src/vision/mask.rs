@@ -4,8 +4,10 @@
 
 use super::error::VisionError;
 use super::npy;
+use super::pictures::palette::palette_entries;
 use super::pictures::photo::resize_rows;
-use super::pictures::photo::{Limits, decode_dynamic};
+use super::pictures::photo::{Limits, decode_dynamic, is_png};
+use image::DynamicImage;
 use pcadlang_numerics::rng::Stream;
 
 /// A mask, true on the object. `data` has `width * height` entries in row-major order.
@@ -84,36 +86,69 @@ impl Mask {
     }
 }
 
-/// Reads a mask from the bytes of a PNG or JPEG (bright pixels are the object; if any pixels are
-/// transparent, opaque pixels are the object) or a `.npy` array of two axes (bool: true;
-/// numbers: above half of the type's range, 127 for uint8 and 0.5 for floats, or above 0
-/// for uint8 arrays without values above 1).
-pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Mask, VisionError> {
+/// Reads a mask from the bytes of a picture or of a `.npy` array of two axes. On the object are
+/// pixels equal to `label`, a grey value, an entry of the palette or a number; without one:
+///
+/// * opaque pixels, if any pixels are transparent;
+/// * bright pixels, of at least half of the type's range (above 0.5 for floats); if a PNG or an array
+///   of whole numbers has none, it holds labels, and those that are not 0;
+/// * in a PNG with a palette the entries that are not 0, nor 255 ("void" in PASCAL VOC) if there
+///   are others.
+///
+/// # Errors
+/// If the bytes cannot be read, or a label is asked of colours.
+pub fn decode(bytes: &[u8], label: Option<u32>, limits: &Limits) -> Result<Mask, VisionError> {
     if npy::is_npy(bytes) {
         let array = npy::parse(bytes)?;
         let (width, height) = array.picture_size()?;
         limits.check(width, height)?;
+        let numbers = |v: Vec<f64>| match label {
+            Some(n) => v.into_iter().map(|x| x == f64::from(n)).collect(),
+            None => v.into_iter().map(|x| x > 0.5).collect(),
+        };
         let data = match array.data {
-            npy::NpyData::Bool(v) => v,
-            npy::NpyData::U8(v) => {
-                let above = if v.iter().all(|&x| x <= 1) { 0 } else { 127 };
-                v.into_iter().map(|x| x > above).collect()
-            }
-            npy::NpyData::F32(v) => v.into_iter().map(|x| x > 0.5).collect(),
-            npy::NpyData::F64(v) => v.into_iter().map(|x| x > 0.5).collect(),
+            npy::NpyData::Bool(v) => on(v.into_iter().map(u32::from), label, 1),
+            npy::NpyData::U8(v) => on(v.into_iter().map(u32::from), label, 128),
+            npy::NpyData::F32(v) => numbers(v.into_iter().map(f64::from).collect()),
+            npy::NpyData::F64(v) => numbers(v),
         };
         return Mask::new(width, height, data);
     }
+    if let Some((width, height, entries)) = palette_entries(bytes, limits)? {
+        let others = entries.iter().any(|e| !matches!(e, 0 | 255));
+        let entry = |e: u8| if label.is_none() && others && e == 255 { 0 } else { u32::from(e) };
+        return Mask::new(width, height, on(entries.into_iter().map(entry), label, 1));
+    }
     let (picture, _) = decode_dynamic(bytes, limits)?;
     let (width, height) = (picture.width(), picture.height());
-    if picture.color().has_alpha() {
-        let rgba = picture.to_rgba8();
-        if rgba.pixels().any(|p| p.0[3] < 255) {
-            return Mask::new(width, height, rgba.pixels().map(|p| p.0[3] >= 128).collect());
+    let data = match picture {
+        DynamicImage::ImageLuma8(p) if is_png(bytes) => {
+            on(p.into_raw().into_iter().map(u32::from), label, 0x80)
         }
-    }
-    let grey = picture.into_luma8();
-    Mask::new(width, height, grey.pixels().map(|p| p.0[0] >= 128).collect())
+        DynamicImage::ImageLuma16(p) => on(p.into_raw().into_iter().map(u32::from), label, 0x8000),
+        _ if label.is_some() => {
+            return Err(VisionError::Damaged(
+                "labels are read from a PNG that is grey or has a palette, or from a .npy array; \
+                 this picture has colours"
+                    .into(),
+            ));
+        }
+        picture => {
+            let rgba = picture.color().has_alpha().then(|| picture.to_rgba8());
+            match rgba.filter(|p| p.pixels().any(|p| p.0[3] < 255)) {
+                Some(rgba) => rgba.pixels().map(|p| p.0[3] >= 128).collect(),
+                None => picture.into_luma8().pixels().map(|p| p.0[0] >= 128).collect(),
+            }
+        }
+    };
+    Mask::new(width, height, data)
+}
+
+/// Returns which values are a label, or without one on the object: those of at least `half`, or
+/// if there are none those that are not 0.
+fn on(values: impl Iterator<Item = u32> + Clone, label: Option<u32>, half: u32) -> Vec<bool> {
+    let least = if values.clone().any(|v| v >= half) { half } else { 1 };
+    values.map(|v| label.map_or(v >= least, |n| v == n)).collect()
 }
 
 /// The likelihood of an observed mask given a rendered one: every pixel is observed
@@ -348,15 +383,18 @@ mod tests {
     #[test]
     fn masks_from_arrays_and_pictures() {
         let u8s = npy::bytes_of(1, "|u1", "False", "(1, 2)", &[0, 1]);
-        assert_eq!(decode(&u8s, &Limits::default()).unwrap().data(), [false, true]);
+        assert_eq!(decode(&u8s, None, &Limits::default()).unwrap().data(), [false, true]);
         let u8s = npy::bytes_of(1, "|u1", "False", "(2, 1)", &[200, 1]);
-        assert_eq!(decode(&u8s, &Limits::default()).unwrap().data(), [true, false]);
+        assert_eq!(decode(&u8s, None, &Limits::default()).unwrap().data(), [true, false]);
         let f32s: Vec<u8> = [0.0f32, 0.5, 0.51, 1.0].iter().flat_map(|x| x.to_le_bytes()).collect();
         let f32s = npy::bytes_of(1, "<f4", "False", "(1, 4)", &f32s);
-        assert_eq!(decode(&f32s, &Limits::default()).unwrap().data(), [false, false, true, true]);
+        assert_eq!(
+            decode(&f32s, None, &Limits::default()).unwrap().data(),
+            [false, false, true, true]
+        );
         let f64s: Vec<u8> = [0.5f64, 0.75].iter().flat_map(|x| x.to_le_bytes()).collect();
         let f64s = npy::bytes_of(1, "<f8", "False", "(1, 2)", &f64s);
-        assert_eq!(decode(&f64s, &Limits::default()).unwrap().data(), [false, true]);
+        assert_eq!(decode(&f64s, None, &Limits::default()).unwrap().data(), [false, true]);
         let png = |picture: image::DynamicImage| {
             let mut out = std::io::Cursor::new(Vec::new());
             picture.write_to(&mut out, image::ImageFormat::Png).unwrap();
@@ -364,10 +402,24 @@ mod tests {
         };
         let grey = image::GrayImage::from_raw(3, 1, vec![0, 255, 100]).unwrap();
         assert_eq!(
-            decode(&png(grey.into()), &Limits::default()).unwrap().data(),
+            decode(&png(grey.into()), None, &Limits::default()).unwrap().data(),
             [false, true, false]
         );
+        // Labels: of 0 and 1, of 16 bits, and those above half as the bright ones.
+        let limits = Limits::default();
+        let read = |bytes: &[u8], label| decode(bytes, label, &limits).unwrap().data().to_vec();
+        let small = image::GrayImage::from_raw(4, 1, vec![0, 1, 2, 100]).unwrap();
+        let small = png(small.into());
+        assert_eq!(read(&small, None), [false, true, true, true]);
+        assert_eq!(read(&small, Some(2)), [false, false, true, false]);
+        let wide = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(3, 1, vec![0, 1, 300]);
+        let wide = png(wide.unwrap().into());
+        assert_eq!(read(&wide, None), [false, true, true]);
+        assert_eq!(read(&wide, Some(300)), [false, false, true]);
         let cut = image::RgbaImage::from_raw(2, 1, vec![255, 255, 255, 0, 0, 0, 0, 255]).unwrap();
-        assert_eq!(decode(&png(cut.into()), &Limits::default()).unwrap().data(), [false, true]);
+        assert_eq!(
+            decode(&png(cut.into()), None, &Limits::default()).unwrap().data(),
+            [false, true]
+        );
     }
 }

@@ -12,9 +12,9 @@ use crate::lang::value::{Closure, Value};
 use pcadlang_syntax::ast::{
     Declaration, Expr, ExprKind, FnDecl, Item, ItemKind, Lambda, Stmt, StmtKind,
 };
-use pcadlang_syntax::diag::{IntoDiagnostic, nearest};
+use pcadlang_syntax::diag::{Diagnostic, IntoDiagnostic, Severity, nearest};
 use pcadlang_syntax::parse_expr;
-use pcadlang_syntax::span::Spanned;
+use pcadlang_syntax::span::{Span, Spanned};
 use std::sync::Arc;
 
 /// The possible types of a parameter.
@@ -349,6 +349,7 @@ impl Lowerer<'_> {
                     self.options(kind, args.get(1..).unwrap_or_default());
                 }
                 self.used_data.push(name.to_string());
+                self.remark(&v, d.name.span);
                 self.constant(v)
             }
             (None, Some(e)) => self.data_default(e, folder),
@@ -388,7 +389,10 @@ impl Lowerer<'_> {
             };
             let Some(options) = self.options(kind, rest) else { return self.nothing() };
             return match (self.inputs.read)(kind, path, folder, &options) {
-                Ok(v) => self.constant(v),
+                Ok(v) => {
+                    self.remark(&v, arg.value.span);
+                    self.constant(v)
+                }
                 Err(f) => {
                     let d = self.error(f.message, arg.value.span, "cannot be read");
                     d.hints.extend(f.hint);
@@ -397,6 +401,16 @@ impl Lowerer<'_> {
             };
         }
         self.expr(e)
+    }
+
+    /// Warns of what users should know of data.
+    fn remark(&mut self, value: &Value, span: Span) {
+        if let Value::Object(object) = value
+            && let Some(message) = object.remark()
+        {
+            let warning = Diagnostic::new(Severity::Warning, message);
+            self.errors.push(warning.primary(span, "read from here"));
+        }
     }
 
     /// The value of a data item of a kind that is given no file.
@@ -439,8 +453,8 @@ impl Lowerer<'_> {
             }
         }
         for (option, what, name, known) in unknown {
-            let d = pcadlang_syntax::diag::Diagnostic::new(
-                pcadlang_syntax::diag::Severity::Error,
+            let d = Diagnostic::new(
+                Severity::Error,
                 format!("{option} {name}: the program has no {what} of this name"),
             );
             self.errors.push(match (nearest(&name, known.iter().copied()), known.is_empty()) {

@@ -41,7 +41,14 @@ pub(super) fn collect(
         let before = out.triangles.len();
         for p in &mesh.primitives {
             let first = out.positions.len();
-            let Some(faces) = add(data, p, &what, &to_scene, frame, &mut out)? else { continue };
+            let Some(mut faces) = add(data, p, &what, &to_scene, frame, &mut out)? else {
+                continue;
+            };
+            // Which side is outside follows from the node's own transform, though a skin ignores
+            // it for positions (glTF 2.0, section 3.7.4).
+            if nodes.global[i].matrix3.determinant() < 0.0 {
+                faces.iter_mut().for_each(|f| f.swap(1, 2));
+            }
             let count = out.positions.len() - first;
             match (skin, &out.rig) {
                 (Some(skin), Some(rig)) => {
@@ -132,11 +139,7 @@ fn add(
             "the glTF file has more than {MOST_TRIANGLES} triangles"
         )));
     }
-    let mirror = to_scene.matrix3.determinant() < 0.0;
     for f in &mut faces {
-        if mirror {
-            f.swap(1, 2);
-        }
         *f = f.map(|c| c + first as u32);
     }
     for v in 0..count {

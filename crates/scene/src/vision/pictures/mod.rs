@@ -3,4 +3,5 @@
 pub mod color;
 pub mod contour_map;
 pub mod npy;
+pub(crate) mod palette;
 pub mod photo;

@@ -1,6 +1,6 @@
-//! Numpy's `.npy` arrays (numpy.lib.format, versions 1.0 to 3.0): little-endian float32
-//! and float64, uint8 and bool, in C order. `.npz` archives, other types and Fortran
-//! order are rejected with a message that says what to do; float32 is written too.
+//! Numpy's `.npy` arrays (numpy.lib.format, versions 1.0 to 3.0): little-endian floats, integers
+//! and bool, in C order. `.npz` archives, other types and Fortran order are rejected with a
+//! message that says what to do; float32 is written too.
 
 use crate::vision::error::VisionError;
 
@@ -9,7 +9,7 @@ use crate::vision::error::VisionError;
 pub enum NpyData {
     /// `<f4`
     F32(Vec<f32>),
-    /// `<f8`
+    /// `<f8`; also `<f2` and whole numbers of more than 8 bits, those beyond 2^53 rounded.
     F64(Vec<f64>),
     /// `|u1`
     U8(Vec<u8>),
@@ -114,13 +114,27 @@ pub fn parse(bytes: &[u8]) -> Result<NpyArray, VisionError> {
         }
         "|u1" | "<u1" | "u1" => NpyData::U8(take(1)?.to_vec()),
         "|b1" | "<b1" | "?" => NpyData::Bool(take(1)?.iter().map(|&b| b != 0).collect()),
+        "<f2" => wider(take(2)?, |b| half::f16::from_le_bytes(b).to_f64()),
+        "|i1" | "<i1" => wider(take(1)?, |b| f64::from(i8::from_le_bytes(b))),
+        "<u2" => wider(take(2)?, |b| f64::from(u16::from_le_bytes(b))),
+        "<i2" => wider(take(2)?, |b| f64::from(i16::from_le_bytes(b))),
+        "<u4" => wider(take(4)?, |b| f64::from(u32::from_le_bytes(b))),
+        "<i4" => wider(take(4)?, |b| f64::from(i32::from_le_bytes(b))),
+        "<u8" => wider(take(8)?, |b| u64::from_le_bytes(b) as f64),
+        "<i8" => wider(take(8)?, |b| i64::from_le_bytes(b) as f64),
         other => {
             return Err(bad(format!(
-                "its elements are '{other}'; float32, float64, uint8 and bool (little-endian) are supported"
+                "its elements are '{other}'; floats, whole numbers and bool (little-endian) are \
+                 supported"
             )));
         }
     };
     Ok(NpyArray { shape, data })
+}
+
+/// Reads numbers of `N` bytes each as float64.
+fn wider<const N: usize>(bytes: &[u8], number: impl Fn([u8; N]) -> f64) -> NpyData {
+    NpyData::F64(bytes.as_chunks().0.iter().map(|b| number(*b)).collect())
 }
 
 /// Returns the text after `'name':` in the header, without leading blanks.

@@ -41,7 +41,7 @@ impl Limits {
 
     /// The maximum number of bytes to decode: 16 per pixel, more than any supported format
     /// needs uncompressed.
-    fn max_bytes(&self) -> u64 {
+    pub(crate) fn max_bytes(&self) -> u64 {
         self.max_pixels.saturating_mul(16).saturating_add(1 << 20)
     }
 }
@@ -182,11 +182,17 @@ pub(crate) fn decode_dynamic(
     Ok((picture, focal))
 }
 
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+/// True if bytes begin as those of a PNG do.
+pub(crate) fn is_png(bytes: &[u8]) -> bool {
+    bytes.starts_with(PNG)
+}
+
 fn format_of(bytes: &[u8]) -> Result<ImageFormat, VisionError> {
-    const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
     if bytes.is_empty() {
         Err(VisionError::Empty)
-    } else if bytes.starts_with(PNG) {
+    } else if is_png(bytes) {
         Ok(ImageFormat::Png)
     } else if bytes.starts_with(b"\xff\xd8\xff") {
         Ok(ImageFormat::Jpeg)
