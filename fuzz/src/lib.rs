@@ -159,8 +159,8 @@ pub fn image(bytes: &[u8]) {
         assert!(u64::from(photo.width()) * u64::from(photo.height()) <= PIXELS.max_pixels);
         let small = photo.shrunk(32);
         assert!(small.width() <= 32 && small.height() <= 32);
-        let _ = mask::decode(bytes, &PIXELS);
-        let _ = depth::decode(bytes, 1000.0, &PIXELS);
+        let _ = mask::decode(bytes, None, &PIXELS);
+        let _ = depth::decode(bytes, 1000.0, 0.0, &PIXELS);
     }
 }
 
@@ -170,11 +170,11 @@ pub fn array(bytes: &[u8]) {
         let count: usize = array.shape.iter().product();
         assert_eq!(array.clone().into_f32().len(), count);
     }
-    if let Ok(mask) = mask::decode(bytes, &PIXELS) {
+    if let Ok(mask) = mask::decode(bytes, None, &PIXELS) {
         assert_eq!(mask.data().len() as u64, u64::from(mask.width()) * u64::from(mask.height()));
         let _ = mask.resized(8, 8);
     }
-    if let Ok(depth) = depth::decode(bytes, 1.0, &PIXELS) {
+    if let Ok(depth) = depth::decode(bytes, 1.0, 0.0, &PIXELS) {
         assert_eq!(depth.data().len() as u64, u64::from(depth.width()) * u64::from(depth.height()));
         let _ = depth.resized(8, 8);
     }

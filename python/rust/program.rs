@@ -279,7 +279,7 @@ fn image(value: &Bound<'_, PyAny>) -> PyResult<Value> {
 /// A mask of a file or an array.
 fn drawn(value: &Bound<'_, PyAny>) -> PyResult<Mask> {
     if let Ok(path) = value.extract::<PathBuf>() {
-        return mask::decode(&std::fs::read(path)?, &Limits::default()).map_err(plain);
+        return mask::decode(&std::fs::read(path)?, None, &Limits::default()).map_err(plain);
     }
     let array = value.py().import("numpy")?.call_method1("asarray", (value,))?;
     let Ok(array) = array.cast_into::<PyArrayDyn<bool>>() else {

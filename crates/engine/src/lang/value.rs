@@ -102,6 +102,7 @@ pub trait Object: Any + fmt::Debug + Send + Sync {
         None
     }
     /// Returns what users should know of it if it was read from a file, such as that it is empty.
+    #[doc(hidden)]
     fn remark(&self) -> Option<String> {
         None
     }
