@@ -214,7 +214,7 @@ def test_a_solid_is_a_widget_or_a_picture(
     vertices, triangles = solid.mesh()
     np.testing.assert_array_equal(np.frombuffer(made.vertices, "<f4").reshape(-1, 3), vertices)
     np.testing.assert_array_equal(np.frombuffer(made.triangles, "<u4").reshape(-1, 3), triangles)
-    # It needs no network: the one address is the name of HTML itself.
+    # It needs no network: the addresses are names of HTML and SVG.
     addresses = set(re.findall(r"https?://[^\"'`]*", made._esm))
     assert addresses <= {"http://www.w3.org/1999/xhtml", "http://www.w3.org/2000/svg"}
     assert not re.search(r"\bfrom *[\"']|\bimport[ (\"']", made._esm)
