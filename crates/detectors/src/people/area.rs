@@ -1,7 +1,7 @@
 //! Parts of a photograph in which people are looked for: the whole, or a box where a person
 //! is said to be.
 
-use super::consensus::{PersonBox, Run};
+use super::consensus::{FILLED, PersonBox, Run};
 use super::detection::{Detection, detect};
 use super::landmarks::{self, View};
 use super::window::Window;
@@ -14,9 +14,7 @@ use pcadlang_scene::vision::Photo;
 const AROUND: f64 = 0.1;
 /// Landmarks are also looked for in a window of this many times the longer side of a box.
 const AROUND_ALL: f64 = 1.25;
-/// The minimum overlap (intersection over union) of a detector's box with that of the landmarks
-/// of the person in it, and of a box that a user drew.
-const DETECTED: f64 = 0.3;
+/// The minimum overlap of the landmarks' box with one that a user drew.
 const DRAWN: f64 = 0.2;
 /// The minimum presence of landmarks in a detector's box: it is low where others are in front.
 const HIDDEN: f64 = 0.05;
@@ -98,13 +96,13 @@ impl Area {
     /// Returns a run as that of the person in a box, if that one fills it.
     fn filling(&self, run: Run, person: PersonBox) -> Option<Run> {
         let (fills, present) = match person.score {
-            Some(_) => (DETECTED, HIDDEN),
+            Some(_) => (FILLED, HIDDEN),
             None => (DRAWN, PRESENT),
         };
         let fit = overlap(run.view.bounds(self.size), person.bounds);
         let seen = fit > fills && run.view.presence > present;
         let score = run.score.max(person.score.unwrap_or(1.0));
-        seen.then(|| Run { score, in_box: Some(person), ..run })
+        seen.then_some(Run { score, in_box: Some(person), ..run })
     }
 }
 

@@ -17,10 +17,11 @@ const NEAR: f64 = 0.3;
 /// Views with more agreement than this, 0 to 1, have the same pose.
 const AGREEING: f64 = 0.5;
 
-/// Landmarks in the whole picture with more overlap than this with a box are of the person in it.
-const FILLED: f64 = 0.3;
-/// Two people whose boxes overlap by more than this are one.
-const ONE: f64 = 0.6;
+/// Landmarks whose box overlaps a detector's by more than this (intersection over union) are of the
+/// person in it.
+pub(super) const FILLED: f64 = 0.3;
+/// Two boxes of people that overlap by more than this are of one person.
+pub(super) const ONE: f64 = 0.6;
 
 /// A view with the score and the window of its detection.
 #[derive(Clone, Debug)]

@@ -25,7 +25,7 @@ use crate::boxes::{around, overlap};
 use crate::nn::{Network, NetworkError};
 use crate::objects::{FoundObject, VIEWS, View as ObjectView};
 use area::Area;
-use consensus::{PersonBox, Run, by_person, consensus, prominence, same, seen, sure};
+use consensus::{ONE, PersonBox, Run, by_person, consensus, prominence, same, seen, sure};
 use landmarks::View;
 use pcadlang_numerics::platform::threads::side_by_side;
 use pcadlang_scene::vision::Photo;
@@ -44,8 +44,6 @@ const IN_COMPANY: f64 = 0.75;
 /// The pose of somebody whose box is this part of the picture is that of the views of the whole
 /// picture, where there are any: such boxes often leave out a part.
 const LARGE: f64 = 0.6;
-/// Boxes of a detector that overlap by more than this are of one person.
-const ONE: f64 = 0.6;
 
 /// The views of a photograph in which boxes of people are looked for.
 pub const VIEWS_OF_PEOPLE: &[ObjectView] = VIEWS.split_at(4).0;
@@ -194,12 +192,9 @@ fn person(all: &[Run], size: (u32, u32), scale: f64) -> Option<Person> {
     let longer = |[left, top, right, bottom]: [f64; 4]| (right - left).max(bottom - top);
     let large = LARGE * f64::from(size.0.max(size.1));
     let in_large_box = |r: &Run| r.in_box.is_some_and(|b| longer(b.bounds) >= large);
-    let mut runs = all.to_vec();
-    if runs.iter().any(|r| r.in_box.is_none()) {
-        runs.retain(|r| !in_large_box(r));
-    }
-    let runs = &runs;
-    let mut c = consensus(runs)?;
+    let seen_whole = all.iter().any(|r| r.in_box.is_none());
+    let runs: Vec<Run> = all.iter().filter(|r| !(seen_whole && in_large_box(r))).cloned().collect();
+    let mut c = consensus(&runs)?;
     let inside = |l: &Landmark| {
         [l.at[0].clamp(0.0, f64::from(size.0)), l.at[1].clamp(0.0, f64::from(size.1))]
     };

@@ -1,7 +1,7 @@
 //! Tests of windows, grouping of detections and consensus of views; and, with the
 //! included networks, of a photograph.
 
-use super::consensus::{Run, by_person, consensus};
+use super::consensus::{PersonBox, Run, by_person, consensus, sure};
 use super::landmarks::{NAMED, SIDE, SeenLandmark, View};
 use super::window::{Beyond, Window};
 use crate::nn::sigmoid;
@@ -139,6 +139,27 @@ fn runs_of_one_person_are_together() {
     ];
     let sizes: Vec<usize> = by_person(all, [400.0, 300.0]).iter().map(Vec::len).collect();
     assert_eq!(sizes, [2, 1, 1], "apart, and not of one size");
+}
+
+#[test]
+fn whoever_fills_a_box_is_the_person_in_it() {
+    let (size, here) = ([400.0, 300.0], run([100.0, 100.0], 40.0, 0.0));
+    let bounds = here.view.bounds(size);
+    let boxed = |score| Run { in_box: Some(PersonBox { bounds, score }), ..here.clone() };
+    let all = vec![run([300.0, 100.0], 40.0, 0.0), here.clone(), boxed(Some(0.6))];
+    let people = by_person(all, size);
+    assert_eq!(people.iter().map(Vec::len).collect::<Vec<_>>(), [2, 1]);
+    // A detector's score counts, half of it where the person is elsewhere; a user's box is
+    // believed as far as landmarks are there, and the first network by half.
+    let elsewhere = [0.0, 0.0, 1.0, 1.0];
+    for (run, at, known) in [
+        (boxed(Some(0.6)), bounds, 0.6),
+        (boxed(Some(0.6)), elsewhere, 0.3),
+        (boxed(None), elsewhere, 0.9),
+        (here, bounds, 0.4),
+    ] {
+        assert_eq!(sure(&[run], at), known);
+    }
 }
 
 #[test]
