@@ -2,7 +2,7 @@
 //! [`super::places`].
 
 use super::hint::{HINT, asked};
-use super::observed::MaskValue;
+use super::observed_maps::MaskValue;
 use super::places::{Place, PlaceAxis};
 use super::seeing::camera;
 use super::{CAMERA, IMAGE, ImageValue, native};

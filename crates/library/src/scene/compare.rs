@@ -1,7 +1,8 @@
 //! Likelihoods of observed pictures given a view.
 
 use super::adjoints::BySolid;
-use super::observed::{DepthValue, ImageValue, MaskValue};
+use super::observed::ImageValue;
+use super::observed_maps::{DepthValue, MaskValue};
 use super::{VIEW, ViewValue, incremental, native};
 use pcadlang_engine::lang::adjoint::Adjoint;
 use pcadlang_engine::lang::builtins::{

@@ -1,7 +1,7 @@
 //! What a user pointed out in a photograph, as a value: a thin layer over
 //! [`pcadlang_scene::vision::hint`].
 
-use super::observed::MaskValue;
+use super::observed_maps::MaskValue;
 use super::{IMAGE, ImageValue, native};
 use crate::model::Program;
 use pcadlang_engine::lang::builtins::{Arg, Args, Row, Type, arg, opt};

@@ -18,6 +18,7 @@ pub mod hint;
 mod inputs;
 mod objects;
 mod observed;
+mod observed_maps;
 mod people;
 pub mod places;
 mod pointed_out;
@@ -29,7 +30,8 @@ mod shapes;
 pub use bodies::AUTORIG;
 pub use data::DETECTOR;
 pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};
-pub use observed::{DepthValue, DetectorValue, ImageValue, KeypointsValue, MaskValue};
+pub use observed::{DetectorValue, ImageValue, KeypointsValue};
+pub use observed_maps::{DepthValue, MaskValue};
 pub use scene_view::SceneView;
 
 pub use pcadlang_engine::lang::builtins::{Arg, Args, Resume, Row, Type, function};

@@ -1,5 +1,5 @@
-//! Observations: photographs and ready-made contour maps, masks, depth maps, keypoints; and
-//! the contours of a photograph, detected with other settings than the default.
+//! Observations: photographs and ready-made contour maps, and keypoints; and the contours of a
+//! photograph, detected with other settings than the default.
 //! Data that comparators derive from an observation alone are computed on first use and
 //! cached with it.
 
@@ -9,8 +9,8 @@ use pcadlang_engine::lang::builtins::{Domain, Row, Type, arg, int, num, opt};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::{Object, Value};
 use pcadlang_scene::vision::{
-    ContourDetector, ContourMap, DepthMap, GradientDetector, Hint, Keypoints, MAP_SIZE,
-    MOST_MAP_SIZE, Mask, Photo, SoftMap,
+    ContourDetector, ContourMap, GradientDetector, Hint, Keypoints, MAP_SIZE, MOST_MAP_SIZE, Photo,
+    SoftMap,
 };
 use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -357,84 +357,6 @@ impl Object for ImageValue {
     fn summary(&self) -> Option<String> {
         let (w, h) = self.size();
         Some(format!("{w} x {h} pixels"))
-    }
-}
-
-/// An observed mask.
-#[derive(Debug)]
-pub struct MaskValue {
-    /// The mask.
-    pub mask: Mask,
-    pub(super) prepared: Prepared,
-}
-
-impl MaskValue {
-    /// Creates an observed mask.
-    pub fn new(mask: Mask) -> Self {
-        MaskValue { mask, prepared: Prepared::default() }
-    }
-}
-
-impl Object for MaskValue {
-    fn type_name(&self) -> &'static str {
-        "a mask"
-    }
-
-    fn as_any(&self) -> &dyn Any {
-        self
-    }
-
-    fn remark(&self) -> Option<String> {
-        let on = self.mask.data().iter().filter(|on| **on).count();
-        let what = match on {
-            0 => "empty: no pixel is on the object",
-            n if n == self.mask.data().len() => "full: every pixel is on the object",
-            _ => return None,
-        };
-        Some(format!("the mask is {what}"))
-    }
-
-    fn numbers(&self) -> Option<Vec<f64>> {
-        Some(self.mask.data().iter().map(|m| f64::from(u8::from(*m))).collect())
-    }
-}
-
-/// An observed depth map.
-#[derive(Debug)]
-pub struct DepthValue {
-    /// The depth map.
-    pub depth: DepthMap,
-    pub(super) prepared: Prepared,
-}
-
-impl DepthValue {
-    /// Creates an observed depth map.
-    pub fn new(depth: DepthMap) -> Self {
-        DepthValue { depth, prepared: Prepared::default() }
-    }
-}
-
-impl Object for DepthValue {
-    fn type_name(&self) -> &'static str {
-        "a depth map"
-    }
-
-    fn as_any(&self) -> &dyn Any {
-        self
-    }
-
-    fn remark(&self) -> Option<String> {
-        let all = self.depth.data();
-        let missing = all.iter().filter(|d| d.is_nan()).count();
-        (missing > 0).then(|| {
-            let n = all.len();
-            format!("{missing} of the {n} depths are taken as not measured: 0 (`missing`) or NaN")
-        })
-    }
-
-    /// The depths; background is infinite, NaN is not measured.
-    fn numbers(&self) -> Option<Vec<f64>> {
-        Some(self.depth.data().iter().map(|d| f64::from(*d)).collect())
     }
 }
 

@@ -2,7 +2,8 @@
 
 use super::found_objects::found;
 use super::hint::{self, HINT};
-use super::observed::{KeypointsValue, MaskValue, PeopleKey};
+use super::observed::{KeypointsValue, PeopleKey};
+use super::observed_maps::MaskValue;
 use super::{IMAGE, ImageValue, native};
 use pcadlang_detectors::boxes::{contains, sides};
 use pcadlang_detectors::people::{FindOptions, Person, Search, VIEWS_OF_PEOPLE, networks};

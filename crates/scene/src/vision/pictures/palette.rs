@@ -69,7 +69,7 @@ mod tests {
             encoder.write_header().unwrap().write_image_data(&row).unwrap();
             let read = palette_entries(&file, &Limits::default()).unwrap();
             assert_eq!(read, Some((9, 1, entries.clone())), "{bits} bits");
-            // A dark red that is no bright pixel is on the object, by its entry.
+            // A dark red is on the object, by its entry.
             let mask = crate::vision::mask::decode(&file, None, &Limits::default()).unwrap();
             let on: Vec<bool> = entries.iter().map(|e| *e == 1).collect();
             assert_eq!(mask.data(), on);
