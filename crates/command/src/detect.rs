@@ -110,14 +110,14 @@ pub fn detect(a: &Detect) -> Result<(), Failure> {
 
 fn detect_people(a: &Detect, photo: &Photo) -> Result<(), Failure> {
     let options = FindOptions { views: a.views, most: a.people as usize, ..FindOptions::default() };
-    let objects = objects::networks::finder()
-        .map_err(plain)?
-        .find_in_views(
-            photo,
-            VIEWS_OF_PEOPLE,
-            &ObjectOptions { most: usize::MAX, ..ObjectOptions::default() },
-        )
-        .map_err(|e| plain(e.to_string()))?;
+    let wide = ObjectOptions { most: usize::MAX, ..ObjectOptions::default() };
+    let objects = match a.bounds {
+        Some(_) => Vec::new(),
+        None => objects::networks::finder()
+            .map_err(plain)?
+            .find_in_views(photo, VIEWS_OF_PEOPLE, &wide)
+            .map_err(|e| plain(e.to_string()))?,
+    };
     let within = a.bounds.map(|b| Search::Within(sides(b)));
     let search = within.unwrap_or(Search::Everywhere(&objects));
     let people = inputs::finder(a.models.as_deref())?

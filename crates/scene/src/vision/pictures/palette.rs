@@ -5,7 +5,7 @@ use crate::vision::error::VisionError;
 use std::io::Cursor;
 
 /// Returns width, height and the entries of a PNG with a palette, in row-major order; `None` for
-/// other pictures.
+/// other pictures, and those whose palette has transparent colours: they are cut out.
 ///
 /// # Errors
 /// If the picture is larger than the limits, or damaged.
@@ -25,7 +25,7 @@ pub(crate) fn palette_entries(
         return Ok(None);
     };
     let (width, height) = reader.info().size();
-    if reader.info().color_type != png::ColorType::Indexed {
+    if reader.info().color_type != png::ColorType::Indexed || reader.info().trns.is_some() {
         return Ok(None);
     }
     limits.check(width, height)?;
@@ -95,6 +95,15 @@ mod tests {
         assert_eq!(read(&voc, None), [false, true, false, true]);
         assert_eq!(read(&voc, Some(3)), [false, false, false, true]);
         assert_eq!(read(&file(&[0, 255]), None), [false, true]);
+        // The first colour is opaque, the second one transparent.
+        let mut cut = Vec::new();
+        let mut encoder = png::Encoder::new(&mut cut, 2, 1);
+        encoder.set_color(png::ColorType::Indexed);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_palette(vec![9; 6]);
+        encoder.set_trns(vec![255, 0]);
+        encoder.write_header().unwrap().write_image_data(&[0, 1]).unwrap();
+        assert_eq!(read(&cut, None), [true, false]);
         assert!(palette_entries(b"no picture", &limits).unwrap().is_none());
     }
 }
