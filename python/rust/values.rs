@@ -150,7 +150,7 @@ fn within(object: &Bound<'_, PyAny>, depth: u32) -> PyResult<Value> {
         return Ok(Value::object(ViewValue(Arc::clone(&view.get().view))));
     }
     if let Ok(solid) = object.cast::<Solid>() {
-        return Ok(Value::object(SolidValue(solid.get().0.clone())));
+        return Ok(Value::object(SolidValue::new(solid.get().0.clone())));
     }
     if let Ok(other) = object.cast::<Object>() {
         return Ok(other.get().0.clone());

@@ -21,7 +21,6 @@ use pcadlang_engine::lang::error::Fault;
 use pcadlang_engine::lang::value::Value;
 use pcadlang_inference::host::{Args, Host};
 use pcadlang_library::scene::{self, ArmatureValue, Row, SolidValue, fault};
-use std::sync::Arc;
 
 /// `scene.autorig` as it is declared in the module `scene`, with what it does.
 pub fn host() -> Host {
@@ -41,5 +40,5 @@ fn autorig(a: &Args) -> Result<Value, Fault> {
             if one { f.with_hint("for a mesh in one piece use `from = \"skeleton\"`") } else { f }
         }),
     };
-    made.map(|b| Value::object(ArmatureValue(Arc::new(b))))
+    made.map(|b| Value::object(ArmatureValue::new(b)))
 }

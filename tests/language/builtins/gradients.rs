@@ -120,13 +120,15 @@ impl E {
 fn numbers(v: &Value) -> (Vec<Vec<f64>>, bool) {
     let points =
         |ps: &mut dyn Iterator<Item = DVec3>| ps.flat_map(|p| p.to_array()).collect::<Vec<f64>>();
-    if let Some(SolidValue(s)) = v.downcast() {
+    if let Some(s) = v.downcast::<SolidValue>() {
+        let s = &s.0;
         return (
             vec![points(&mut s.landmarks().iter().map(|l| l.position)), points(&mut s.vertices())],
             true,
         );
     }
-    if let Some(ArmatureValue(b)) = v.downcast() {
+    if let Some(b) = v.downcast::<ArmatureValue>() {
+        let b = &b.0;
         let rig = b.rig();
         let heads = points(&mut rig.joints().iter().map(|j| j.head));
         let tails = points(&mut rig.joints().iter().map(|j| j.tail));

@@ -298,7 +298,7 @@ fn mesh(
         true => gltf::load(bytes, frame, beside)?.mesh()?,
         false => obj::load_in(bytes, frame)?,
     };
-    Ok(Value::object(SolidValue(Solid::new(Arc::new(mesh)))))
+    Ok(Value::object(SolidValue::new(Solid::new(Arc::new(mesh)))))
 }
 
 /// Reads a glTF file, or a rig, its mesh, and its morphs if it names some.
@@ -309,7 +309,7 @@ fn armature(
     beside: &ReadRelative,
 ) -> Result<Value, GeomError> {
     let invalid = |why: &str| GeomError::Invalid(why.to_owned());
-    let value = |body: Armature| Value::object(ArmatureValue(Arc::new(body)));
+    let value = |body: Armature| Value::object(ArmatureValue::new(body));
     if gltf::is_gltf(file, bytes) {
         let loaded = gltf::load(bytes, frame, beside)?;
         if loaded.rig.is_none() {

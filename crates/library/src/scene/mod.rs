@@ -29,7 +29,7 @@ mod shapes;
 
 pub use bodies::AUTORIG;
 pub use data::DETECTOR;
-pub use objects::{AffineValue, ArmatureValue, CameraValue, SolidValue, ViewValue};
+pub use objects::{AffineValue, ArmatureValue, CameraValue, Remarks, SolidValue, ViewValue};
 pub use observed::{DetectorValue, ImageValue, KeypointsValue};
 pub use observed_maps::{DepthValue, MaskValue};
 pub use scene_view::SceneView;

@@ -16,7 +16,22 @@ use std::sync::Arc;
 /// landmark's x, y and z in turn, and to those of each vertex of its meshes, in world
 /// coordinates.
 #[derive(Clone, Debug)]
-pub struct SolidValue(pub Solid);
+pub struct SolidValue(pub Solid, Remarks);
+
+/// What users should know of how a file was read.
+pub type Remarks = Vec<String>;
+
+impl SolidValue {
+    /// Creates a solid.
+    pub fn new(solid: Solid) -> Self {
+        SolidValue(solid, Remarks::new())
+    }
+
+    /// Creates a solid that was read from a file.
+    pub fn read(solid: Solid, remarks: Remarks) -> Self {
+        SolidValue(solid, remarks)
+    }
+}
 
 impl Object for SolidValue {
     fn type_name(&self) -> &'static str {
@@ -25,6 +40,10 @@ impl Object for SolidValue {
 
     fn as_any(&self) -> &dyn Any {
         self
+    }
+
+    fn remark(&self) -> Option<String> {
+        (!self.1.is_empty()).then(|| self.1.join("; "))
     }
 
     fn own_numbers(&self) -> usize {
@@ -66,7 +85,7 @@ impl Object for AffineValue {
     /// right one acts first.
     fn multiply(&self, other: &Value) -> Option<Result<Value, Fault>> {
         if let Some(s) = other.downcast::<SolidValue>() {
-            return Some(Ok(Value::object(SolidValue(s.0.placed(self.0)))));
+            return Some(Ok(Value::object(SolidValue::new(s.0.placed(self.0)))));
         }
         let other = other.downcast::<AffineValue>()?;
         Some(Ok(Value::object(AffineValue(self.0 * other.0))))
@@ -106,7 +125,19 @@ pub(super) fn affine_adjoint(linear: DMat3, shift: DVec3) -> Adjoint {
 /// derivatives with respect to the rest positions of the joints' heads, their tails, the
 /// keypoints and the vertices.
 #[derive(Clone, Debug)]
-pub struct ArmatureValue(pub Arc<Armature>);
+pub struct ArmatureValue(pub Arc<Armature>, Remarks);
+
+impl ArmatureValue {
+    /// Creates an armature.
+    pub fn new(body: Armature) -> Self {
+        ArmatureValue(Arc::new(body), Remarks::new())
+    }
+
+    /// Creates an armature that was read from a file.
+    pub fn read(body: Armature, remarks: Remarks) -> Self {
+        ArmatureValue(Arc::new(body), remarks)
+    }
+}
 
 impl Object for ArmatureValue {
     fn type_name(&self) -> &'static str {
@@ -115,6 +146,10 @@ impl Object for ArmatureValue {
 
     fn as_any(&self) -> &dyn Any {
         self
+    }
+
+    fn remark(&self) -> Option<String> {
+        (!self.1.is_empty()).then(|| self.1.join("; "))
     }
 
     fn field(&self, name: &str) -> Option<Value> {
@@ -168,7 +203,7 @@ impl Object for ViewValue {
 
     fn field(&self, name: &str) -> Option<Value> {
         match name {
-            "solid" => Some(Value::object(SolidValue(self.0.solid().clone()))),
+            "solid" => Some(Value::object(SolidValue::new(self.0.solid().clone()))),
             "camera" => Some(Value::object(CameraValue(*self.0.camera()))),
             _ => None,
         }

@@ -64,7 +64,7 @@ pub(super) const TABLE: &[Row] = &[
             let pose = pose(a, body)?;
             let before = previous.and_then(|p| p.state.downcast_ref::<Posed>());
             let (solid, posed) = body.posed_after(&pose, &rules, before).map_err(fault)?;
-            Ok((Value::object(SolidValue(solid)), Arc::new(posed)))
+            Ok((Value::object(SolidValue::new(solid)), Arc::new(posed)))
         },
     )
     .vjp(vjps::skin),
@@ -92,7 +92,7 @@ pub(super) const TABLE: &[Row] = &[
                 }
                 list.push((&**name, *x));
             }
-            body.clothed(&list, a.num("cloth")?).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
+            body.clothed(&list, a.num("cloth")?).map(|b| Value::object(ArmatureValue::new(b))).map_err(fault)
         },
     )
     .vjp(vjps::shaped),
@@ -112,7 +112,7 @@ pub(super) const TABLE: &[Row] = &[
          child joints move along.",
         |a| {
             let body = armature(a)?;
-            body.stretched(&stretches(a, body)?).map(|b| Value::object(ArmatureValue(Arc::new(b)))).map_err(fault)
+            body.stretched(&stretches(a, body)?).map(|b| Value::object(ArmatureValue::new(b))).map_err(fault)
         },
     )
     .vjp(vjps::stretched),

@@ -90,7 +90,7 @@ pub(super) const TABLE: &[Row] = &[
                 let message = format!("scene.group: a group of {count} meshes; at most {MOST_MESHES}");
                 return Err(Fault::new(FaultKind::Limit, message));
             }
-            Ok(Value::object(SolidValue(Solid::group(&members))))
+            Ok(Value::object(SolidValue::new(Solid::group(&members))))
         },
     )
     .vjp(vjps::group),
@@ -105,7 +105,7 @@ pub(super) const TABLE: &[Row] = &[
         "The solid moved so that the centre of its bounding box is at the origin.",
         |a| {
             let s = a.object::<SolidValue>(0, "a solid")?;
-            Ok(Value::object(SolidValue(s.0.centred(a.bool("fit")?))))
+            Ok(Value::object(SolidValue::new(s.0.centred(a.bool("fit")?))))
         },
     )
     .vjp(vjps::centred),
@@ -130,7 +130,7 @@ pub(super) const TABLE: &[Row] = &[
                 _ => Err(a.wrong(1, "a record of points [x, y, z]")),
             };
             let points = a.record(1)?.iter().map(point).collect::<Result<Vec<_>, _>>()?;
-            Ok(Value::object(SolidValue(s.0.clone().with_landmarks(points))))
+            Ok(Value::object(SolidValue::new(s.0.clone().with_landmarks(points))))
         },
     )
     .vjp(vjps::landmarks),
@@ -157,7 +157,7 @@ pub(super) const TABLE: &[Row] = &[
 ];
 
 fn solid(solid: Solid) -> Value {
-    Value::object(SolidValue(solid))
+    Value::object(SolidValue::new(solid))
 }
 
 /// Reads three numbers, or one for all three.
