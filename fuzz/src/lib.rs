@@ -160,7 +160,7 @@ pub fn image(bytes: &[u8]) {
         let small = photo.shrunk(32);
         assert!(small.width() <= 32 && small.height() <= 32);
         let _ = mask::decode(bytes, None, &PIXELS);
-        let _ = depth::decode(bytes, 1000.0, 0.0, &PIXELS);
+        let _ = depth::decode(bytes, None, 0.0, &PIXELS);
     }
 }
 
@@ -174,7 +174,7 @@ pub fn array(bytes: &[u8]) {
         assert_eq!(mask.data().len() as u64, u64::from(mask.width()) * u64::from(mask.height()));
         let _ = mask.resized(8, 8);
     }
-    if let Ok(depth) = depth::decode(bytes, 1.0, 0.0, &PIXELS) {
+    if let Ok(depth) = depth::decode(bytes, Some(1.0), 0.0, &PIXELS) {
         assert_eq!(depth.data().len() as u64, u64::from(depth.width()) * u64::from(depth.height()));
         let _ = depth.resized(8, 8);
     }

@@ -299,7 +299,7 @@ fn accepts_its_seeds(name: &str, target: Target) {
             "gltf" => load(seed, &FileFrame::default(), &|_| Err("beside".into()))
                 .map_or_else(|e| e.to_string().contains("beside"), |loaded| loaded.mesh().is_ok()),
             "image" => photo::decode(seed, &Limits::default()).is_ok(),
-            "array" => depth::decode(seed, 1.0, 0.0, &Limits::default()).is_ok(),
+            "array" => depth::decode(seed, Some(1.0), 0.0, &Limits::default()).is_ok(),
             "camera" => Camera::from_json(text()).is_ok(),
             "keypoints" => People::parse(seed).is_ok(),
             "network" => pcadlang_detectors::nn::Network::read(seed).is_ok(),

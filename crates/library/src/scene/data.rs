@@ -14,7 +14,7 @@ use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::geom::armature::{Armature, morphs_from_json, rig_from_json};
 use pcadlang_scene::geom::{FileFrame, GeomError, Solid, UpAxis, gltf, obj};
 use pcadlang_scene::vision::keypoints::{self, Keypoints, People};
-use pcadlang_scene::vision::{ContourMap, Limits, VisionError, depth, mask, npy, photo};
+use pcadlang_scene::vision::{ContourMap, Limits, VisionError, depth, mask, photo};
 use std::sync::Arc;
 
 const PATH: Arg = arg("file", Type::Str, "The path, relative to the program's folder.");
@@ -102,13 +102,13 @@ pub(super) const TABLE: &[Row] = &[
             opt(
                 "scale",
                 Type::Num,
-                "1000 for a picture, 1 for an array",
+                "1000 for whole numbers, 1 for others",
                 "How much of a number is one scene unit: 1000 for millimetres (Kinect, RealSense), \
                  5000 for TUM's, 1000 over `depth_scale` for BOP's, in metres.",
             ),
         ],
         Type::Object("a depth map"),
-        "A depth map: `.npy`, or a grey PNG of 16 bits. 0 is not measured; `inf` is background, and \
+        "A depth map: `.npy`, or a grey picture of 16 bits or more, PNG, TIFF or OpenEXR. 0 is not measured; `inf` is background, and \
          so are negative numbers, and 0 if another number is `missing`.",
         || Arc::new(DepthFile),
     ),
@@ -216,8 +216,7 @@ impl DataFormat for DepthFile {
         options: &Options,
         _: &ReadRelative,
     ) -> Result<Value, Fault> {
-        let usual = if npy::is_npy(bytes) { 1.0 } else { 1000.0 };
-        let scale = number(options, "scale").unwrap_or(usual);
+        let scale = number(options, "scale");
         let missing = number(options, "missing").unwrap_or(0.0);
         depth::decode(bytes, scale, missing, &Limits::default())
             .map(|d| Value::object(DepthValue::new(d)))

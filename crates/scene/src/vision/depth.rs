@@ -10,7 +10,8 @@ mod tally;
 pub use self::tally::DepthTally;
 
 use super::error::VisionError;
-use super::pictures::npy;
+use super::pictures::floats::{self, Numbers};
+use super::pictures::npy::{self, NpyData};
 use super::pictures::photo::{Limits, decode_dynamic};
 use pcadlang_numerics::num::LN_SQRT_2PI;
 use pcadlang_numerics::rng::Stream;
@@ -68,43 +69,55 @@ impl DepthMap {
     }
 }
 
-/// Reads a depth map from bytes: a grey PNG of 16 bits or a `.npy` array of two axes. A depth is a
-/// value over `scale`; `missing` and NaN are not measured, as sensors and data sets have it; other
-/// values of 0 and below, and `inf`, are background.
+/// Reads a depth map from bytes: a grey picture of 16 bits or more (PNG, TIFF, OpenEXR) or a
+/// `.npy` array of two axes. A depth is a number over `scale`, by default 1000 for whole numbers
+/// (millimetres) and 1 for others; `missing` and NaN are not measured, as sensors and data sets
+/// have it; other values of 0 and below, and `inf`, are background.
 ///
 /// # Errors
 /// If the bytes cannot be read, or hold no depths; a scale that is not positive.
 pub fn decode(
     bytes: &[u8],
-    scale: f64,
+    scale: Option<f64>,
     missing: f64,
     limits: &Limits,
 ) -> Result<DepthMap, VisionError> {
-    if !(scale > 0.0 && scale.is_finite()) {
-        return Err(VisionError::Range { name: "scale", rule: "positive", value: scale });
+    if let Some(value) = scale.filter(|s| !(*s > 0.0 && s.is_finite())) {
+        return Err(VisionError::Range { name: "scale", rule: "positive", value });
     }
+    let Numbers { width, height, values, whole } = numbers(bytes, limits)?;
+    let scale = scale.unwrap_or(if whole { 1000.0 } else { 1.0 });
     let depth = |v: f64| if v == missing { f32::NAN } else { (v / scale) as f32 };
+    DepthMap::new(width, height, values.into_iter().map(depth).collect())
+}
+
+/// The numbers of a file, as they stand in it.
+fn numbers(bytes: &[u8], limits: &Limits) -> Result<Numbers, VisionError> {
     if npy::is_npy(bytes) {
         let array = npy::parse(bytes)?;
         let (width, height) = array.picture_size()?;
         limits.check(width, height)?;
-        return DepthMap::new(
-            width,
-            height,
-            array.into_f32().into_iter().map(|v| depth(f64::from(v))).collect(),
-        );
+        let whole = !matches!(array.data, NpyData::F32(_) | NpyData::F64(_));
+        let values = array.into_f32().into_iter().map(f64::from).collect();
+        return Ok(Numbers { width, height, values, whole });
+    }
+    if floats::is_tiff(bytes) {
+        return floats::tiff(bytes, limits);
+    }
+    if floats::is_exr(bytes) {
+        return floats::exr(bytes, limits);
     }
     let (picture, _) = decode_dynamic(bytes, limits)?;
     let (width, height) = (picture.width(), picture.height());
     let image::DynamicImage::ImageLuma16(picture) = picture else {
         return Err(VisionError::Damaged(
-            "a depth map must be a grey picture of 16 bits, or a .npy array; fewer bits, or \
-             colours, are a picture of depths, without their unit"
+            "a depth map must be a grey picture of 16 bits or more (PNG, TIFF, OpenEXR), or a .npy \
+             array; fewer bits, or colours, are a picture of depths, without their unit"
                 .into(),
         ));
     };
-    let data = picture.pixels().map(|p| depth(f64::from(p.0[0]))).collect();
-    DepthMap::new(width, height, data)
+    let values = picture.pixels().map(|p| f64::from(p.0[0])).collect();
+    Ok(Numbers { width, height, values, whole: true })
 }
 
 /// The likelihood of an observed depth map given a rendered one. Per observed pixel:

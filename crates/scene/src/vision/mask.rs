@@ -110,7 +110,7 @@ pub fn decode(bytes: &[u8], label: Option<u32>, limits: &Limits) -> Result<Mask,
             npy::NpyData::Bool(v) => on(v.into_iter().map(u32::from), label, 1),
             npy::NpyData::U8(v) => on(v.into_iter().map(u32::from), label, 128),
             npy::NpyData::F32(v) => numbers(v.into_iter().map(f64::from).collect()),
-            npy::NpyData::F64(v) => numbers(v),
+            npy::NpyData::F64(v) | npy::NpyData::Whole(v) => numbers(v),
         };
         return Mask::new(width, height, data);
     }

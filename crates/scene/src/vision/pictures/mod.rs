@@ -2,6 +2,7 @@
 
 pub mod color;
 pub mod contour_map;
+pub(crate) mod floats;
 pub mod npy;
 pub(crate) mod palette;
 pub mod photo;

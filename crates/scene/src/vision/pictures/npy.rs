@@ -9,8 +9,10 @@ use crate::vision::error::VisionError;
 pub enum NpyData {
     /// `<f4`
     F32(Vec<f32>),
-    /// `<f8`; also `<f2` and whole numbers of more than 8 bits, those beyond 2^53 rounded.
+    /// `<f8`, `<f2`
     F64(Vec<f64>),
+    /// Whole numbers of more than 8 bits or with a sign; those beyond 2^53 are rounded.
+    Whole(Vec<f64>),
     /// `|u1`
     U8(Vec<u8>),
     /// `|b1`
@@ -33,7 +35,7 @@ impl NpyArray {
     pub fn into_f32(self) -> Vec<f32> {
         match self.data {
             NpyData::F32(v) => v,
-            NpyData::F64(v) => v.into_iter().map(|x| x as f32).collect(),
+            NpyData::F64(v) | NpyData::Whole(v) => v.into_iter().map(|x| x as f32).collect(),
             NpyData::U8(v) => v.into_iter().map(f32::from).collect(),
             NpyData::Bool(v) => v.into_iter().map(|x| f32::from(u8::from(x))).collect(),
         }
@@ -114,14 +116,16 @@ pub fn parse(bytes: &[u8]) -> Result<NpyArray, VisionError> {
         }
         "|u1" | "<u1" | "u1" => NpyData::U8(take(1)?.to_vec()),
         "|b1" | "<b1" | "?" => NpyData::Bool(take(1)?.iter().map(|&b| b != 0).collect()),
-        "<f2" => wider(take(2)?, |b| half::f16::from_le_bytes(b).to_f64()),
-        "|i1" | "<i1" => wider(take(1)?, |b| f64::from(i8::from_le_bytes(b))),
-        "<u2" => wider(take(2)?, |b| f64::from(u16::from_le_bytes(b))),
-        "<i2" => wider(take(2)?, |b| f64::from(i16::from_le_bytes(b))),
-        "<u4" => wider(take(4)?, |b| f64::from(u32::from_le_bytes(b))),
-        "<i4" => wider(take(4)?, |b| f64::from(i32::from_le_bytes(b))),
-        "<u8" => wider(take(8)?, |b| u64::from_le_bytes(b) as f64),
-        "<i8" => wider(take(8)?, |b| i64::from_le_bytes(b) as f64),
+        "<f2" => NpyData::F64(
+            take(2)?.as_chunks().0.iter().map(|b| half::f16::from_le_bytes(*b).to_f64()).collect(),
+        ),
+        "|i1" | "<i1" => whole(take(1)?, |b| f64::from(i8::from_le_bytes(b))),
+        "<u2" => whole(take(2)?, |b| f64::from(u16::from_le_bytes(b))),
+        "<i2" => whole(take(2)?, |b| f64::from(i16::from_le_bytes(b))),
+        "<u4" => whole(take(4)?, |b| f64::from(u32::from_le_bytes(b))),
+        "<i4" => whole(take(4)?, |b| f64::from(i32::from_le_bytes(b))),
+        "<u8" => whole(take(8)?, |b| u64::from_le_bytes(b) as f64),
+        "<i8" => whole(take(8)?, |b| i64::from_le_bytes(b) as f64),
         other => {
             return Err(bad(format!(
                 "its elements are '{other}'; floats, whole numbers and bool (little-endian) are \
@@ -132,9 +136,9 @@ pub fn parse(bytes: &[u8]) -> Result<NpyArray, VisionError> {
     Ok(NpyArray { shape, data })
 }
 
-/// Reads numbers of `N` bytes each as float64.
-fn wider<const N: usize>(bytes: &[u8], number: impl Fn([u8; N]) -> f64) -> NpyData {
-    NpyData::F64(bytes.as_chunks().0.iter().map(|b| number(*b)).collect())
+/// Reads whole numbers of `N` bytes each.
+fn whole<const N: usize>(bytes: &[u8], number: impl Fn([u8; N]) -> f64) -> NpyData {
+    NpyData::Whole(bytes.as_chunks().0.iter().map(|b| number(*b)).collect())
 }
 
 /// Returns the text after `'name':` in the header, without leading blanks.
