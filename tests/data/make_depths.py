@@ -26,7 +26,7 @@ def exr(name, channels, **header):
     OpenEXR.File(header, channels).write(str(folder / name))
 
 
-colours = {f"ViewLayer.Combined.{c}": np.zeros_like(z) for c in "RGBA"}
+colours = {f"ViewLayer.Combined.{c}": np.full_like(z, i) for i, c in enumerate("RGBA")}
 exr("passes.exr", colours | {"ViewLayer.Depth.Z": np.where(np.isinf(z), np.float32(1e10), z)})
 exr("half.exr", {"Y": z.astype(np.float16)}, compression=OpenEXR.PIZ_COMPRESSION)
 exr("grey.exr", {c: z for c in "RGB"})
