@@ -26,9 +26,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<Value, KeypointsError> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| invalid(&e))?;
     let mut found = Map::new();
     for (field, names) in NAMES {
-        let Some(name) = names.iter().map(|n| format!("{n}.npy")).find(|n| {
-            archive.index_for_name(n).is_some()
-        }) else {
+        let Some(name) =
+            names.iter().map(|n| format!("{n}.npy")).find(|n| archive.index_for_name(n).is_some())
+        else {
             continue;
         };
         let file = archive.by_name(&name).map_err(|e| invalid(&e))?;

@@ -102,6 +102,7 @@ fn instance(n: &Node, names: Option<&[String]>) -> Result<Person, KeypointsError
 pub(super) fn names(of: Option<&Node>) -> Option<Vec<String>> {
     let by_number = of?.get("keypoint_id2name")?;
     let count = by_number.fields().count();
-    let name = |i: usize| by_number.get(&i.to_string())?.value.as_str().map(|s| usual(s).into_owned());
+    let name =
+        |i: usize| by_number.get(&i.to_string())?.value.as_str().map(|s| usual(s).into_owned());
     (0..count).map(name).collect()
 }

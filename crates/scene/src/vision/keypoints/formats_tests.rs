@@ -69,7 +69,12 @@ fn openpose_with_feet_hands_and_face() {
 #[test]
 fn alphapose_finds_the_picture() {
     let result = |image: &str, count: usize| json!({ "image_id": image, "keypoints": flat(count), "score": 3.1, "idx": [0.0] });
-    let p = of(&json!([result("other.jpg", 17), result("a/skier.jpg", 26), result("two.png", 136), result("two.png", 68)]));
+    let p = of(&json!([
+        result("other.jpg", 17),
+        result("a/skier.jpg", 26),
+        result("two.png", 136),
+        result("two.png", 68)
+    ]));
     assert_eq!(ids(&p), ["other.jpg", "a/skier.jpg", "two.png:1", "two.png:2"]);
     for found in [p.pick(None, Some("skier")), p.pick(Some("skier.jpg"), None)] {
         let k = found.unwrap();
@@ -147,7 +152,8 @@ fn ultralytics_json_and_labels() {
     assert_eq!(ids(&p), ["1", "2:1", "2:2"]);
 
     let joints = |each: &dyn Fn(i32) -> String| (0..17).map(each).collect::<String>();
-    let three = joints(&|i| if i == 3 { " 0 0 0.1".into() } else { format!(" 0.{} 0.5 0.25", 10 + i) });
+    let three =
+        joints(&|i| if i == 3 { " 0 0 0.1".into() } else { format!(" 0.{} 0.5 0.25", 10 + i) });
     for more in ["", " 0.9", " 0.9 7"] {
         let p = people(&format!("0 0.5 0.5 0.2 0.4{three}{more}\n"));
         let k = p.pick(None, None).unwrap();
@@ -156,7 +162,11 @@ fn ultralytics_json_and_labels() {
     }
     let labels = joints(&|i| format!(" 0.{} 0.5 {}", 10 + i, i % 3));
     let k = people(&format!("\n0 0.5 0.5 0.2 0.4{labels}")).pick(None, None).unwrap();
-    assert_eq!((k.points().len(), at(&k, "r_eye")), (11, Some((0.12, 0.5, 1.0))), "0, 1, 2 of data sets");
+    assert_eq!(
+        (k.points().len(), at(&k, "r_eye")),
+        (11, Some((0.12, 0.5, 1.0))),
+        "0, 1, 2 of data sets"
+    );
     let two = joints(&|i| format!(" 0.{} 0.5", 10 + i));
     let p = people(&format!("0 0.5 0.5 0.2 0.4{two}\r\n0 0.5 0.5 0.2 0.4{two}\r\n"));
     assert_eq!((ids(&p), p.pick(Some("2"), None).unwrap().points().len()), (vec!["1", "2"], 17));
@@ -175,7 +185,11 @@ fn rtmlib_arrays() {
     for v in [
         json!({ "keypoints": k, "scores": s }),
         json!([k, s]),
-        json!(k.iter().map(|p| p.iter().map(|[x, y]| [*x, *y, 1.07]).collect::<Vec<_>>()).collect::<Vec<_>>()),
+        json!(
+            k.iter()
+                .map(|p| p.iter().map(|[x, y]| [*x, *y, 1.07]).collect::<Vec<_>>())
+                .collect::<Vec<_>>()
+        ),
     ] {
         let p = of(&v);
         assert_eq!(ids(&p), ["1", "2"], "{v}");
@@ -278,7 +292,9 @@ fn mediapipe_in_every_interface() {
         let k = only(&json!({ "pose_landmarks": [list(visibility, 33)] }));
         assert_eq!(at(&k, "nose"), Some((0.0, 0.5, sure)));
     }
-    let k = only(&json!({ "pose_landmarks": [body], "left_hand_landmarks": [list(json!("none"), 21)] }));
+    let k = only(
+        &json!({ "pose_landmarks": [body], "left_hand_landmarks": [list(json!("none"), 21)] }),
+    );
     assert_eq!((k.points().len(), at(&k, "l_pinky_tip")), (54, Some((20.0 / 32.0, 0.5, 1.0))));
     let frame = json!({ "pose_landmarks": [body, body] });
     assert_eq!(ids(&of(&json!([frame, frame]))), ["1:1", "1:2", "2:1", "2:2"]);
@@ -292,7 +308,10 @@ fn tensorflow_js_poses() {
         { "x": 3, "y": 4, "score": 0.5, "name": "left_eye" },
         { "position": { "x": 5, "y": 6 }, "score": 0.25, "part": "rightWrist" },
     ] }]));
-    assert_eq!((at(&k, "l_eye"), at(&k, "r_wrist")), (Some((3.0, 4.0, 0.5)), Some((5.0, 6.0, 0.25))));
+    assert_eq!(
+        (at(&k, "l_eye"), at(&k, "r_wrist")),
+        (Some((3.0, 4.0, 0.5)), Some((5.0, 6.0, 0.25)))
+    );
 }
 
 #[test]
@@ -304,7 +323,9 @@ fn deeplabcut_tables() {
     let k = p.pick(Some("0"), None).unwrap();
     assert_eq!((at(&k, "nose"), at(&k, "l_hip")), (Some((1.5, 2.0, 0.9)), Some((3.0, 4.0, 0.25))));
     assert!(p.pick(Some("1"), None).unwrap().is_empty());
-    assert!(p.pick(None, Some("skier")).unwrap_err().message.starts_with("it contains 2 people: 0, 1"));
+    assert!(
+        p.pick(None, Some("skier")).unwrap_err().message.starts_with("it contains 2 people: 0, 1")
+    );
 
     let labels = "\u{feff}scorer,,,me,me\r\nbodyparts,,,nose,nose\r\ncoords,,,x,y\r\n\
                   labeled-data,run,img1.png,1,2\r\nlabeled-data,run,skier.png,3,4\r\n";
@@ -336,12 +357,16 @@ fn sleap_tables() {
     let p = people(analysis);
     assert_eq!(ids(&p), ["0:a", "0:b", "3"]);
     let k = p.pick(Some("0:a"), None).unwrap();
-    assert_eq!((at(&k, "nose"), at(&k, "tail base")), (Some((1.0, 2.0, 1.0)), Some((3.0, 4.0, 0.25))));
+    assert_eq!(
+        (at(&k, "nose"), at(&k, "tail base")),
+        (Some((1.0, 2.0, 1.0)), Some((3.0, 4.0, 0.25)))
+    );
     assert_eq!(p.pick(Some("3"), None).unwrap().points().len(), 1);
     let sorted = "track,frame_idx,instance.score,nose.score,nose.x,nose.y\n,0,,,1,2\n,4,,,3,4\n";
     assert_eq!(at(&people(sorted).pick(Some("4"), None).unwrap(), "nose"), Some((3.0, 4.0, 1.0)));
-    let frames = "frame_idx,inst0.track,inst0.nose.x,inst0.nose.y,inst1.nose.x,inst1.nose.y\n5,a,1,2,3,4\n";
-    assert_eq!(ids(&people(frames)), ["5:inst0", "5:inst1"]);
+    let frames =
+        "frame_idx,inst0.track,inst0.nose.x,inst0.nose.y,inst1.nose.x,inst1.nose.y\n5,a,1,2,3,4\n";
+    assert_eq!(ids(&people(frames)), ["5:0", "5:1"]);
     assert!(said("a,b\n1,2\n").contains("neither DeepLabCut's"));
     assert!(said("frame_idx,nose.x\n1,2\n").contains("nor SLEAP's"));
 }
@@ -354,7 +379,11 @@ fn what_pcadlang_writes_is_read() {
         "scene": {}, "best": { "nose": [1, 2] }, "seconds": 3.5,
     });
     let k = only(&own);
-    assert_eq!((at(&k, "nose"), at(&k, "l_hip")), (Some((269.9, 39.8, 1.0)), Some((1.0, 2.0, 1.0))));
-    let coco = json!([{ "image_id": "skier", "category_id": 1, "keypoints": flat(17), "score": 1 }]);
+    assert_eq!(
+        (at(&k, "nose"), at(&k, "l_hip")),
+        (Some((269.9, 39.8, 1.0)), Some((1.0, 2.0, 1.0)))
+    );
+    let coco =
+        json!([{ "image_id": "skier", "category_id": 1, "keypoints": flat(17), "score": 1 }]);
     assert_eq!(only(&coco).points().len(), 17);
 }

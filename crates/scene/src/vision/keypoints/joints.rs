@@ -166,10 +166,7 @@ pub(super) fn names_of(
 
 /// Makes joints of names and [x, y, confidence]. Detectors write 0, 0, a confidence of 0 or less,
 /// or nothing for a joint that is missing.
-pub(super) fn listed(
-    names: Vec<String>,
-    joints: &[[f64; 3]],
-) -> Result<Keypoints, KeypointsError> {
+pub(super) fn listed(names: Vec<String>, joints: &[[f64; 3]]) -> Result<Keypoints, KeypointsError> {
     let known = |[x, y, c]: &[f64; 3]| {
         x.is_finite() && y.is_finite() && (*x != 0.0 || *y != 0.0) && *c > 0.0
     };

@@ -1,10 +1,10 @@
 //! Ultralytics' label text: a line per person, `class x y width height`, then two or three numbers
 //! per joint, then the person's confidence and track, if they were asked for.
 
+use super::KeypointsError;
 use super::joint_lists::LISTS;
 use super::joints::{listed, names_of};
 use super::people::{Person, number};
-use super::KeypointsError;
 
 /// The numbers of a line before its joints: class and box.
 const BEFORE: usize = 5;
@@ -23,9 +23,10 @@ pub(super) fn people(text: &str) -> Result<Vec<Person>, KeypointsError> {
     for (i, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let place = format!("line {}", i + 1);
         let numbers = line.split_whitespace().map(|word| {
-            word.parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(|| {
-                KeypointsError::new(format!("{place}: `{word}` must be a number"))
-            })
+            word.parse::<f64>()
+                .ok()
+                .filter(|x| x.is_finite())
+                .ok_or_else(|| KeypointsError::new(format!("{place}: `{word}` must be a number")))
         });
         let numbers: Vec<f64> = numbers.collect::<Result<_, _>>()?;
         let joints = numbers.get(BEFORE..).unwrap_or_default();
@@ -62,6 +63,7 @@ fn unknown(place: &str, numbers: usize) -> KeypointsError {
         "{place} has {numbers} numbers; expected `class x y width height` and two or three numbers \
          for each joint"
     );
-    let hint = format!("joints have no names here: known are lists of {}", super::joint_lists::known());
+    let hint =
+        format!("joints have no names here: known are lists of {}", super::joint_lists::known());
     KeypointsError::new(message).hint(hint)
 }

@@ -26,9 +26,8 @@ impl People {
         }
         if bytes.starts_with(b"\x89HDF") {
             let error = KeypointsError::new("it is an HDF5 file, which is not read");
-            return Err(error.hint(
-                "write CSV: DeepLabCut with save_as_csv = True, SLEAP as an analysis CSV",
-            ));
+            return Err(error
+                .hint("write CSV: DeepLabCut with save_as_csv = True, SLEAP as an analysis CSV"));
         }
         let begins = bytes.iter().find(|b| !b.is_ascii_whitespace()).copied().unwrap_or(b'{');
         if begins.is_ascii_alphanumeric() || b",\"-.+".contains(&begins) {

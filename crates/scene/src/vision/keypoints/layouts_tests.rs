@@ -204,7 +204,8 @@ fn unknown_lists_of_joints_name_the_known_ones() {
         message.starts_with(
             "`[0].keypoints` has 14 joints, but a list of so many is not known; known are \
              15 OpenPose MPI, 16 MPII, 17 COCO, "
-        ) && message.contains("136 Halpe Full-Body; name others, {\"nose\": [x, y, confidence], …}"),
+        ) && message
+            .contains("136 Halpe Full-Body; name others, {\"nose\": [x, y, confidence], …}"),
         "{message}"
     );
     assert!(said(&json!([3])).contains("25 OpenPose BODY_25"), "{}", said(&json!([3])));

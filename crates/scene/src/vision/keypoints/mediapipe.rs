@@ -21,10 +21,7 @@ const HANDS: [(&str, Extra); 4] = [
 
 /// Reads an object with landmarks, or landmarks: 33 of them, or a list of them per person. Ids
 /// are 1, 2, ….
-pub(super) fn people(
-    root: &Node,
-    size: Option<(u32, u32)>,
-) -> Result<Vec<Person>, KeypointsError> {
+pub(super) fn people(root: &Node, size: Option<(u32, u32)>) -> Result<Vec<Person>, KeypointsError> {
     let field = |key: &&str| root.get(key);
     let bodies = lists(&KEYS.iter().find_map(field).unwrap_or_else(|| root.clone()))?;
     let hands: Vec<(Vec<Node>, Extra)> = HANDS
@@ -37,7 +34,8 @@ pub(super) fn people(
         let mut points = landmarks(list, &MEDIAPIPE.map(str::to_owned))?;
         for (hand, part) in &hands {
             let Some(hand) = hand.get(i) else { continue };
-            let names = part.names(hand.len()).unwrap_or_else(|| part.names(21).unwrap_or_default());
+            let names =
+                part.names(hand.len()).unwrap_or_else(|| part.names(21).unwrap_or_default());
             points.extend(landmarks(hand, &names)?);
         }
         let id = if several { (i + 1).to_string() } else { String::new() };

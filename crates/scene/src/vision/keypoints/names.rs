@@ -78,12 +78,8 @@ const LIMBS: [&str; 6] = ["shoulder", "elbow", "wrist", "hip", "knee", "ankle"];
 /// Names of joints that are close enough to count as one where a detector has only the first and a
 /// rig only the second, or the other way round; each follows `l_` or `r_`. MediaPipe's foot index
 /// is the tip of the big toe, its index and pinky are the knuckles of these fingers.
-const SAME: [[&str; 2]; 4] = [
-    ["big_toe", "foot_index"],
-    ["index_mcp", "index"],
-    ["pinky_mcp", "pinky"],
-    ["hand", "wrist"],
-];
+const SAME: [[&str; 2]; 4] =
+    [["big_toe", "foot_index"], ["index_mcp", "index"], ["pinky_mcp", "pinky"], ["hand", "wrist"]];
 
 /// Returns the name in the spelling of these lists: `left_eye`, `LEFT_EYE`, `LEye` and `eye.L`
 /// become `l_eye`. Other names are unchanged.
@@ -98,7 +94,9 @@ pub(super) fn usual(name: &str) -> Cow<'_, str> {
         _ => None,
     };
     let given = match &words[..] {
-        [first, .., last] => side(first).map(|s| (0, s)).or(side(last).map(|s| (words.len() - 1, s))),
+        [first, .., last] => {
+            side(first).map(|s| (0, s)).or(side(last).map(|s| (words.len() - 1, s)))
+        }
         _ => None,
     };
     let prefix = given.map(|(at, side)| {

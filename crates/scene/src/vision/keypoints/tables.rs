@@ -50,10 +50,8 @@ pub(super) fn is_table(text: &str) -> bool {
 /// Reads the people of all frames; a person's id is the frame's, with `:` and the person's name if
 /// there are several.
 pub(super) fn people(text: &str) -> Result<Vec<Person>, KeypointsError> {
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .from_reader(text.as_bytes());
+    let mut reader =
+        csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
     let mut records = Vec::new();
     let mut fields = 0;
     for record in reader.records() {
