@@ -150,6 +150,8 @@ fn ultralytics_json_and_labels() {
     assert_eq!(k.position(&k.points()[0], (200, 50)), [20.0, 10.0]);
     let p = of(&json!([[person(1.0)], [person(1.0), person(1.0)]]));
     assert_eq!(ids(&p), ["1", "2:1", "2:2"]);
+    assert_eq!(ids(&of(&json!([[], [person(1.0)]]))), ["2"]);
+    assert!(of(&json!([[], []])).is_empty());
 
     let joints = |each: &dyn Fn(i32) -> String| (0..17).map(each).collect::<String>();
     let three =
@@ -184,6 +186,7 @@ fn rtmlib_arrays() {
     let s = vec![vec![1.07; 26]; 2];
     for v in [
         json!({ "keypoints": k, "scores": s }),
+        json!({ "keypoints": k, "keypoint_scores": s }),
         json!([k, s]),
         json!(
             k.iter()
@@ -296,6 +299,9 @@ fn mediapipe_in_every_interface() {
         &json!({ "pose_landmarks": [body], "left_hand_landmarks": [list(json!("none"), 21)] }),
     );
     assert_eq!((k.points().len(), at(&k, "l_pinky_tip")), (54, Some((20.0 / 32.0, 0.5, 1.0))));
+    let none =
+        json!({ "poseLandmarks": [[]], "leftHandLandmarks": [[]], "rightHandLandmarks": [] });
+    assert!(only(&none).is_empty());
     let frame = json!({ "pose_landmarks": [body, body] });
     assert_eq!(ids(&of(&json!([frame, frame]))), ["1:1", "1:2", "2:1", "2:2"]);
     let message = said(&json!({ "landmarks": [list(json!(1), 21)] }).to_string());

@@ -22,14 +22,16 @@ pub(super) fn of_person(of: &Node, names: Option<&[String]>) -> Result<Keypoints
         Value::Object(_) => named(&all, !(of.get("best").is_some() && of.get("scene").is_some())),
         Value::Array(list) => match list.first() {
             Some(Value::Object(_)) => objects(&all),
-            Some(Value::Array(_)) => {
-                let scores = SCORES.iter().find_map(|k| of.get(k));
-                rows(&all, scores.as_ref(), names)
-            }
+            Some(Value::Array(_)) => rows(&all, scores(of).as_ref(), names),
             _ => triples(&all, names),
         },
         _ => Err(all.wrong("joints, or null if nobody was found")),
     }
+}
+
+/// Returns the confidences beside `keypoints`.
+pub(super) fn scores<'a>(of: &Node<'a>) -> Option<Node<'a>> {
+    SCORES.iter().find_map(|key| of.get(key)).filter(|n| !n.value.is_null())
 }
 
 /// Reads `{"nose": [x, y, confidence], …}`; without `confident`, the third number is something
@@ -83,7 +85,6 @@ pub(super) fn rows(
     scores: Option<&Node>,
     names: Option<&[String]>,
 ) -> Result<Keypoints, KeypointsError> {
-    let scores = scores.filter(|s| !s.value.is_null());
     let scores = scores.map(|s| s.numbers("the confidences of the joints")).transpose()?;
     if scores.as_ref().is_some_and(|s| s.len() != all.len()) {
         return Err(all.wrong("as long as its confidences"));

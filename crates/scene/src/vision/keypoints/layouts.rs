@@ -5,7 +5,7 @@
 //! person, `people.rs` chooses one.
 
 use super::joint_lists::known;
-use super::joints::{is_columns, named, of_person, rows};
+use super::joints::{is_columns, named, of_person, rows, scores};
 use super::node::Node;
 use super::people::{People, Person, number};
 use super::{Keypoints, KeypointsError, arrays, coco, labels, mediapipe, openpose, tables};
@@ -77,6 +77,7 @@ fn list(root: &Node, items: &[Value]) -> Result<Vec<Person>, KeypointsError> {
         },
         Some(Value::Array(_)) => match depth(root.value) {
             (_, Value::Object(o)) if o.contains_key("keypoints") => pictures(root),
+            (_, Value::Array(_)) => pictures(root),
             (_, Value::Object(_)) => mediapipe::people(root, None),
             (2.., Value::Number(_) | Value::Null) => numbers(root, None),
             _ => Err(unknown(root)),
@@ -103,7 +104,7 @@ fn object(root: &Node) -> Result<Vec<Person>, KeypointsError> {
     }
     if let Some(all) = root.get("keypoints") {
         return match depth(all.value) {
-            (3.., Value::Number(_) | Value::Null) => numbers(&all, root.get("scores").as_ref()),
+            (3.., Value::Number(_) | Value::Null) => numbers(&all, scores(root).as_ref()),
             _ => Ok(vec![person(root)?]),
         };
     }
@@ -213,13 +214,15 @@ fn numbers(all: &Node, scores: Option<&Node>) -> Result<Vec<Person>, KeypointsEr
     }
 }
 
-/// Returns how deep lists are nested, along the first element of each, and what is innermost.
+/// Returns how deep lists are nested, along the first element of each that is no empty list, and
+/// what is innermost.
 fn depth(value: &Value) -> (usize, &Value) {
     let (mut at, mut deep) = (value, 0);
     while let Value::Array(list) = at {
         deep += 1;
-        match list.first() {
-            Some(first) => at = first,
+        let full = |v: &&Value| v.as_array().is_none_or(|list| !list.is_empty());
+        match list.iter().find(full).or(list.first()) {
+            Some(inner) => at = inner,
             None => break,
         }
     }

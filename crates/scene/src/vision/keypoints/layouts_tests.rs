@@ -68,6 +68,7 @@ fn many_by_id() {
     assert_eq!(message, "it contains 9 people: p0, p1, p2, p3, p4, … 9 in all");
     assert_eq!(split_id("a/b.json#id 1"), ("a/b.json", Some("id 1")));
     assert_eq!(split_id("a#b/c.json"), ("a#b/c.json", None));
+    assert_eq!(split_id("a/b.csv#c/d.png:e"), ("a/b.csv", Some("c/d.png:e")));
     assert_eq!((split_id("c.json#"), split_id("#c")), (("c.json#", None), ("#c", None)));
 }
 

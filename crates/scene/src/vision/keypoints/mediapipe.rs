@@ -1,7 +1,7 @@
 //! MediaPipe's landmarks: of its solutions and its tasks, in Python, in JavaScript, and as the
 //! JSON of protocol buffers.
 
-use super::joint_lists::Extra;
+use super::joint_lists::{Extra, HAND};
 use super::names::MEDIAPIPE;
 use super::node::Node;
 use super::people::Person;
@@ -33,10 +33,9 @@ pub(super) fn people(root: &Node, size: Option<(u32, u32)>) -> Result<Vec<Person
     let one = |(i, list): (usize, &Node)| {
         let mut points = landmarks(list, &MEDIAPIPE.map(str::to_owned))?;
         for (hand, part) in &hands {
-            let Some(hand) = hand.get(i) else { continue };
-            let names =
-                part.names(hand.len()).unwrap_or_else(|| part.names(21).unwrap_or_default());
-            points.extend(landmarks(hand, &names)?);
+            if let (Some(hand), Some(names)) = (hand.get(i), part.names(HAND.len())) {
+                points.extend(landmarks(hand, &names)?);
+            }
         }
         let id = if several { (i + 1).to_string() } else { String::new() };
         let keypoints = Keypoints::new(points)?.into_normalised().sized(size);
@@ -67,6 +66,9 @@ fn lists<'a>(all: &Node<'a>) -> Result<Vec<Node<'a>>, KeypointsError> {
 }
 
 fn landmarks(list: &Node, names: &[String]) -> Result<Vec<Keypoint>, KeypointsError> {
+    if list.value.as_array().is_some_and(Vec::is_empty) {
+        return Ok(Vec::new());
+    }
     let wanted = "{\"x\": …, \"y\": …, \"visibility\": …}";
     if list.len() != names.len() {
         return Err(list.wrong(&format!("a list of {} landmarks {wanted}", names.len())));

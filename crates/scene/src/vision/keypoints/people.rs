@@ -68,15 +68,23 @@ pub(super) fn number(people: &mut [Person]) {
     }
 }
 
-/// Splits a path with `#ID`, which picks a person from the file, into path and id.
+/// Splits a path with `#ID`, which picks a person from the file, into path and id. The id has a
+/// slash (as pictures' paths have) only after a file with an extension of this kind.
 pub fn split_id(path: &str) -> (&str, Option<&str>) {
+    let extension = |file: &str| EXTENSIONS.iter().any(|e| file.to_lowercase().ends_with(e));
     match path.rsplit_once('#') {
-        Some((file, id)) if !file.is_empty() && !id.is_empty() && !id.contains(['/', '\\']) => {
+        Some((file, id))
+            if !file.is_empty()
+                && !id.is_empty()
+                && (!id.contains(['/', '\\']) || extension(file)) =>
+        {
             (file, Some(id))
         }
         _ => (path, None),
     }
 }
+
+const EXTENSIONS: [&str; 5] = [".json", ".csv", ".txt", ".npy", ".npz"];
 
 impl People {
     /// The number of people, including those that were searched for but not detected.
