@@ -379,7 +379,7 @@ fn sleap_tables() {
 
 #[test]
 fn what_pcadlang_writes_is_read() {
-    // A standard deviation of 5 pixels, or of half a pixel, is no confidence.
+    // The third number is a standard deviation, of 5 pixels or of half a pixel.
     let own = json!({
         "keypoints": { "nose": [269.9, 39.8, 5.2], "l_hip": [1, 2, 0.5] }, "body": { "nose": [1, 2, 3] },
         "scene": {}, "best": { "nose": [1, 2] }, "seconds": 3.5,

@@ -47,7 +47,7 @@ pub(super) fn people(text: &str) -> Result<Vec<Person>, KeypointsError> {
     Ok(people)
 }
 
-/// Returns the number of joints, and of numbers for each, of a line with so many numbers after
+/// Returns the number of joints, and of numbers for each, of a line with this many numbers after
 /// the box. COCO's joints may be followed by one or two others.
 fn form(numbers: usize) -> Option<(usize, usize)> {
     let after = |each: usize| (0..=2).any(|more| numbers == 17 * each + more).then_some((17, each));

@@ -214,8 +214,8 @@ fn numbers(all: &Node, scores: Option<&Node>) -> Result<Vec<Person>, KeypointsEr
     }
 }
 
-/// Returns how deep lists are nested, along the first element of each that is no empty list, and
-/// what is innermost.
+/// Returns how deep lists are nested, along the first element of each other than an empty list,
+/// and what is innermost.
 fn depth(value: &Value) -> (usize, &Value) {
     let (mut at, mut deep) = (value, 0);
     while let Value::Array(list) = at {

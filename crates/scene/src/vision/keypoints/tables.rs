@@ -90,7 +90,7 @@ fn read(
     let path: Vec<&str> =
         columns.frame.iter().map(|at| cell(record, *at)).filter(|part| !part.is_empty()).collect();
     let frame = path.join("/");
-    // A name of the index, on a line of its own, is no frame.
+    // A line with nothing but a name is that of the index, not a frame.
     let others = (0..record.len()).filter(|at| !columns.frame.contains(at));
     if !frame.contains(|c: char| c.is_ascii_digit())
         && others.into_iter().all(|at| cell(record, at).is_empty())
