@@ -18,7 +18,7 @@ use image::{DynamicImage, GrayImage, ImageFormat, Luma, RgbImage, RgbaImage};
 use pcadlang::Program;
 use pcadlang_scene::vision::npy;
 use pcadlang_workbench::bank::{Features, Learn, learn};
-use std::io::Cursor;
+use std::io::{Cursor, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::sync::atomic::AtomicU64;
@@ -183,8 +183,51 @@ fn people() -> Vec<Vec<u8>> {
         format!("{{\"images\": {images}, \"annotations\": [{one}, {one}]}}"),
         format!("{{\"pose_landmarks\": [{landmarks}]}}"),
     ];
-    PEOPLE.iter().map(|t| t.as_bytes().to_vec()).chain(made.map(String::into_bytes)).collect()
+    let positions = ["[10, 20]"; 17].join(", ");
+    let columns = ["10.5"; 17].join(", ");
+    let hand = ["1, 2, 0.5"; 21].join(", ");
+    let line = format!("0 0.5 0.5 0.2 0.4{}", " 0.25 0.5 0.9".repeat(17));
+    let tools = [
+        format!(
+            "{{\"people\": [{{\"pose_keypoints_2d\": [{coco}, 1, 1, 1], \
+             \"hand_left_keypoints_2d\": [{hand}]}}]}}"
+        ),
+        format!("{{\"a/000001.jpg\": {{\"bodies\": [{{\"joints\": [{coco}]}}]}}}}"),
+        format!(
+            "{{\"meta_info\": {{\"keypoint_id2name\": {{\"0\": \"nose\"}}}}, \"instance_info\": \
+             [{{\"frame_id\": 1, \"instances\": [{{\"keypoints\": [[1, 2]], \"keypoint_scores\": [1.2]}}]}}]}}"
+        ),
+        format!("[{{\"keypoints\": {{\"x\": [{columns}], \"y\": [{columns}]}}, \"track_id\": 3}}]"),
+        format!(
+            "{{\"keypoints\": [[{positions}], [{positions}]], \"scores\": [[{columns}], [{columns}]]}}"
+        ),
+        format!("{{\"poseLandmarks\": [{landmarks}]}}"),
+        "[{\"keypoints\": [{\"name\": \"leftEye\", \"x\": 1, \"y\": 2, \"score\": 0.5}]}]"
+            .to_owned(),
+        format!("{line}\n{line} 0.9 4\n"),
+        DEEPLABCUT.to_owned(),
+        SLEAP.to_owned(),
+    ];
+    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, shape) in [("keypoints.npy", &[1, 17, 2][..]), ("scores.npy", &[1, 17])] {
+        let count = shape.iter().product();
+        archive.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
+        let array = npy::f32_array(shape, (0..count).map(|i| 1.0 + i as f32));
+        archive.write_all(&array).unwrap();
+    }
+    let arrays = [
+        archive.finish().unwrap().into_inner(),
+        npy::f32_array(&[17, 3], (0..51).map(|i| i as f32)),
+    ];
+    let texts = PEOPLE.iter().map(|t| t.as_bytes().to_vec());
+    texts.chain(made.into_iter().chain(tools).map(String::into_bytes)).chain(arrays).collect()
 }
+
+const DEEPLABCUT: &str = "scorer,s,s,s,s,s,s\nindividuals,a,a,a,b,b,b\nbodyparts,nose,nose,nose,nose,nose,nose\n\
+    coords,x,y,likelihood,x,y,likelihood\nlabeled-data/v/000001.png,1,2,0.5,3,4,\n7,,,,5,6,0.1\n";
+
+const SLEAP: &str =
+    "track,frame_idx,instance.score,nose.x,nose.y,nose.score\na,0,0.8,1,2,1.1\nb,0,,3,,\n";
 
 /// Returns the seeds of a target.
 fn seeds_of(target: &str) -> Vec<Vec<u8>> {

@@ -91,6 +91,32 @@ fn the_likelihood_is_that_of_the_projected_landmarks() {
     }
 }
 
+/// OpenPose's toes and COCO-WholeBody's hands go to MediaPipe's landmarks, with their spread.
+#[test]
+fn joints_go_to_the_landmark_in_the_same_place() {
+    let text = BAR
+        .replace("{ nose: [0, 1, 0], l_ankle:", "{ l_foot_index: [0, 1, 0], l_index:")
+        .replace("param sd = 1.5;", "let sd = { other: 1, l_foot_index: 4, l_index: 2 };");
+    let likelihood = |joints: &str| {
+        let k = People::parse(joints.as_bytes()).unwrap().pick(None, None).unwrap();
+        let p = Program::parse(&text).unwrap().observe("photo", photo());
+        let m = p.observe("points", Value::object(KeypointsValue(k))).compile();
+        m.unwrap_or_else(|e| panic!("{e}")).simulate(3, 0).unwrap().log_likelihood()
+    };
+    let own = likelihood("{\"l_foot_index\": [250, 20], \"l_index\": [230, 205]}");
+    let zeros = |n: usize| "0, 0, 0, ".repeat(n);
+    let openpose = format!(
+        "{{\"people\": [{{\"pose_keypoints_2d\": [{}250, 20, 1, {}0, 0, 0], \
+         \"hand_left_keypoints_2d\": [{}230, 205, 1, {}0, 0, 0]}}]}}",
+        zeros(19),
+        zeros(4),
+        zeros(5),
+        zeros(14)
+    );
+    assert!(own.is_finite() && own != 0.0);
+    assert_eq!(likelihood(&openpose), own);
+}
+
 #[test]
 fn pixels_shares_and_other_sizes_of_the_picture_agree() {
     let likelihood = |k: Keypoints| {

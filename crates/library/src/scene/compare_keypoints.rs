@@ -375,7 +375,9 @@ impl KeypointsOf {
             if !self.model.confident {
                 detection.confidence = 1.0;
             }
-            let own = self.model.by_joint.iter().find(|(name, _)| *name == p.name);
+            // A detection may have another name than its landmark: l_big_toe, l_foot_index.
+            let spread = |of: &str| self.model.by_joint.iter().find(|(name, _)| **name == *of);
+            let own = spread(&p.name).or_else(|| spread(names.get(landmark)?));
             let own = own.map(|(_, sd)| model(*sd)).transpose()?;
             let model = own.unwrap_or_else(|| Arc::clone(&usual));
             let constants = model.constants(&detection);

@@ -135,8 +135,9 @@ pub(super) const TABLE: &[Row] = &[
             "The path, relative to the program's folder; a suffix `#ID` selects a person.",
         )],
         Type::Object("keypoints"),
-        "A person's joints from a pose detector, JSON in the program's own layout, COCO's or \
-         MediaPipe's; without a file, no joints.",
+        "A person's joints from a pose detector: OpenPose, MMPose, AlphaPose, Ultralytics, RTMLib, \
+         MediaPipe, DeepLabCut, SLEAP, COCO's layout or the program's own (see \
+         `docs/reference/formats.md`); without a file, no joints.",
         || Arc::new(KeypointsFile),
     ),
     kind(

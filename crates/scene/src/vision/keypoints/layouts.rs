@@ -1,251 +1,259 @@
 //! The layouts of keypoint files, distinguished by their shape; the [parent](super) lists
 //! them.
 //!
-//! This file only parses: `people.rs` chooses the person, and `matching.rs` matches the
-//! joints.
+//! This file finds the people of a file, each layout's reader is beside it; `joints.rs` reads one
+//! person, `people.rs` chooses one.
 
-use super::names::{COCO, MEDIAPIPE, usual};
+use super::joint_lists::known;
+use super::joints::{is_columns, named, of_person, rows, scores};
 use super::node::Node;
-use super::people::{People, Person};
-use super::{Keypoint, Keypoints, KeypointsError};
+use super::people::{People, Person, number};
+use super::{Keypoints, KeypointsError, arrays, coco, labels, mediapipe, openpose, tables};
+use crate::vision::npy;
 use serde_json::Value;
-use std::sync::Arc;
-
-const LAYOUTS: &str = "one person's {\"nose\": [x, y, confidence], …}, people by id {\"ID\": {\"keypoints\": {…}}, …}, \
-                       COCO's \"annotations\" or results, or MediaPipe's \"pose_landmarks\"";
-const POINT: &str = "[x, y] or [x, y, confidence], or null if it was not found";
-
-/// Names of the field with MediaPipe's landmarks.
-const MEDIAPIPE_KEYS: [&str; 2] = ["pose_landmarks", "landmarks"];
 
 impl People {
     /// Reads a file in one of the layouts of the [parent module](super).
     ///
     /// # Errors
-    /// If it is not JSON, has an unknown layout, or contains an invalid value; the
-    /// message has its path.
+    /// If it has an unknown layout, or contains an invalid value; the message has its path, or
+    /// its line.
     pub fn parse(bytes: &[u8]) -> Result<People, KeypointsError> {
+        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        if npy::is_npy(bytes) || bytes.starts_with(b"PK\x03\x04") {
+            let all = people(&Node::root(&arrays::read(bytes)?))?;
+            return Ok(People { all });
+        }
+        if bytes.starts_with(b"\x89HDF") {
+            let error = KeypointsError::new("it is an HDF5 file, which is not read");
+            return Err(error
+                .hint("write CSV: DeepLabCut with save_as_csv = True, SLEAP as an analysis CSV"));
+        }
+        let begins = bytes.iter().find(|b| !b.is_ascii_whitespace()).copied().unwrap_or(b'{');
+        if begins.is_ascii_alphanumeric() || b",\"-.+".contains(&begins) {
+            let text = String::from_utf8_lossy(bytes);
+            if labels::is_labels(&text) {
+                return Ok(People { all: labels::people(&text)? });
+            }
+            if tables::is_table(&text) {
+                return Ok(People { all: tables::people(&text)? });
+            }
+        }
         let document = serde_json::from_slice(bytes)
             .map_err(|e| KeypointsError::new(format!("not JSON: {e}")))?;
-        people(&Node::root(&document)).map(|all| People { all })
+        let all = people(&Node::root(&document))?;
+        Ok(People { all })
     }
+}
+
+/// Returns the error that a document has none of the layouts.
+fn unknown(root: &Node) -> KeypointsError {
+    let layouts = "one person's {\"nose\": [x, y, confidence], …}, people by id {\"ID\": \
+                   {\"keypoints\": {…}}, …}, or the output of OpenPose, MMPose, AlphaPose, \
+                   Ultralytics, RTMLib, MediaPipe, COCO or its results";
+    root.wrong(layouts).hint(format!("joints without names are known in lists of {}", known()))
 }
 
 /// Returns all people of a document.
-fn people(root: &Node) -> Result<Vec<Person>, KeypointsError> {
+pub(super) fn people(root: &Node) -> Result<Vec<Person>, KeypointsError> {
     match root.value {
         Value::Null => Ok(Vec::new()),
-        Value::Array(items) => match items.first() {
-            None => Ok(Vec::new()),
-            Some(v) if v.get("keypoints").is_some() => coco(root, root),
-            Some(Value::Array(_)) => mediapipe(root, None),
-            Some(v) if v.get("x").is_some() => mediapipe(root, None),
-            Some(_) => Err(root.wrong(LAYOUTS)),
-        },
-        Value::Object(_) => {
-            if let Some(all) = root.get("annotations") {
-                return coco(&all, root);
-            }
-            if let Some(all) = MEDIAPIPE_KEYS.iter().find_map(|k| root.get(k)) {
-                return mediapipe(&all, root.size());
-            }
-            if root.get("keypoints").is_some() {
-                return Ok(vec![person(root)?]);
-            }
-            let is_person = |n: &Node| {
-                n.get("keypoints").is_some() || MEDIAPIPE_KEYS.iter().any(|k| n.get(k).is_some())
-            };
-            if root.fields().any(|(_, n)| is_person(&n)) {
-                let one = |(id, n): (&str, Node)| Ok(Person { id: id.to_owned(), ..person(&n)? });
-                return root.fields().map(one).collect();
-            }
-            if root.fields().any(|(_, n)| !(n.value.is_array() || n.value.is_null())) {
-                return Err(root.wrong(LAYOUTS));
-            }
-            Ok(vec![Person { keypoints: named(root)?, ..Person::default() }])
-        }
-        _ => Err(root.wrong(LAYOUTS)),
+        Value::Array(items) => list(root, items),
+        Value::Object(_) => object(root),
+        _ => Err(unknown(root)),
     }
 }
 
-/// Reads `{"keypoints": …}`; null means nobody.
-fn person(of: &Node) -> Result<Person, KeypointsError> {
-    let keypoints = match (of.value, of.get("keypoints")) {
-        (Value::Null, _) => Keypoints::default(),
-        (_, Some(all)) => match all.value {
-            Value::Null => Keypoints::default(),
-            Value::Object(_) => named(&all)?,
-            Value::Array(_) => triples(&all, None)?,
-            _ => return Err(all.wrong("an object of joints, or null if nobody was found")),
+fn list(root: &Node, items: &[Value]) -> Result<Vec<Person>, KeypointsError> {
+    let any = |key: &str| items.iter().any(|v| v.get(key).is_some());
+    match items.first() {
+        None => Ok(Vec::new()),
+        Some(_) if any("instances") => frames(root, None),
+        Some(_) if any("keypoints") => coco::people(root, root),
+        Some(Value::Object(first)) => match mediapipe::KEYS.iter().any(|key| any(key)) {
+            true => pictures(root),
+            false if first.contains_key("x") => mediapipe::people(root, None),
+            false => Err(unknown(root)),
         },
-        (_, None) => {
-            if let Some(all) = MEDIAPIPE_KEYS.iter().find_map(|k| of.get(k)) {
-                let mut found = mediapipe(&all, of.size())?;
-                if found.len() > 1 {
-                    return Err(all.wrong("the landmarks of one person"));
-                }
-                return Ok(Person { id: String::new(), ..found.pop().unwrap_or_default() });
-            }
+        Some(Value::Array(_)) => match depth(root.value) {
+            (_, Value::Object(o)) if o.contains_key("keypoints") => pictures(root),
+            (_, Value::Array(_)) => pictures(root),
+            (_, Value::Object(_)) => mediapipe::people(root, None),
+            (2.., Value::Number(_) | Value::Null) => numbers(root, None),
+            _ => Err(unknown(root)),
+        },
+        Some(_) => Err(unknown(root)),
+    }
+}
+
+fn object(root: &Node) -> Result<Vec<Person>, KeypointsError> {
+    if let Some(all) = root.get("annotations") {
+        return coco::people(&all, root);
+    }
+    if openpose::is_openpose(root) {
+        return openpose::people(root);
+    }
+    if let Some(all) = root.get("instance_info") {
+        return frames(&all, coco::names(root.get("meta_info").as_ref()).as_deref());
+    }
+    if let Some(all) = root.get("predictions").filter(|n| n.value.is_array()) {
+        return people(&all);
+    }
+    if mediapipe::KEYS.iter().any(|k| root.get(k).is_some()) {
+        return mediapipe::people(root, root.size());
+    }
+    if let Some(all) = root.get("keypoints") {
+        return match depth(all.value) {
+            (3.., Value::Number(_) | Value::Null) => numbers(&all, scores(root).as_ref()),
+            _ => Ok(vec![person(root)?]),
+        };
+    }
+    let is_person = |n: &Node| {
+        n.get("keypoints").is_some()
+            || mediapipe::KEYS.iter().any(|k| n.get(k).is_some())
+            || openpose::is_openpose(n)
+    };
+    if root.fields().any(|(_, n)| is_person(&n)) {
+        return by_id(root);
+    }
+    if root.fields().any(|(_, n)| !(n.value.is_array() || n.value.is_null())) {
+        return Err(unknown(root));
+    }
+    Ok(vec![Person { keypoints: named(root, true)?, ..Person::default() }])
+}
+
+/// Reads `{"ID": person or pictures' people, …}`.
+fn by_id(root: &Node) -> Result<Vec<Person>, KeypointsError> {
+    let mut all = Vec::new();
+    for (id, n) in root.fields() {
+        if openpose::is_openpose(&n) {
+            let people = openpose::people(&n)?;
+            all.extend(people.into_iter().map(|p| p.of_picture(id)));
+        } else {
+            all.push(Person { id: id.to_owned(), ..person(&n)? });
+        }
+    }
+    number(&mut all);
+    Ok(all)
+}
+
+/// Reads `{"keypoints": …}`, or MediaPipe's landmarks of one person; null means nobody.
+fn person(of: &Node) -> Result<Person, KeypointsError> {
+    if of.value.is_null() {
+        return Ok(Person::default());
+    }
+    if of.get("keypoints").is_none() {
+        if !mediapipe::KEYS.iter().any(|k| of.get(k).is_some()) {
             return Err(of.wrong("an object with `keypoints`"));
         }
-    };
-    Ok(Person { keypoints: sized(keypoints, of.size()), ..Person::default() })
-}
-
-fn sized(k: Keypoints, size: Option<(u32, u32)>) -> Keypoints {
-    size.map_or(k.clone(), |(w, h)| k.in_image(w, h))
-}
-
-/// Reads `{"nose": [x, y, confidence], …}`.
-fn named(all: &Node) -> Result<Keypoints, KeypointsError> {
-    let mut points: Vec<Keypoint> = Vec::new();
-    for (name, n) in all.fields().filter(|(_, n)| !n.value.is_null()) {
-        let numbers: Vec<Node> = n.items().collect();
-        let (x, y, confidence) = match &numbers[..] {
-            [x, y] => (x, y, 1.0),
-            [x, y, c] => (x, y, confidence(c)?),
-            _ => return Err(n.wrong(POINT)),
-        };
-        let name = Arc::from(usual(name));
-        if points.iter().any(|p| p.name == name) {
-            return Err(
-                n.wrong(&format!("given only once, but `{name}` also occurs in another spelling"))
-            );
+        let mut found = mediapipe::people(of, of.size())?;
+        if found.len() > 1 {
+            return Err(of.wrong("the landmarks of one person"));
         }
-        let (x, y) = (x.number("a number of pixels")?, y.number("a number of pixels")?);
-        points.push(Keypoint::new(name, [x, y], confidence));
+        return Ok(Person { id: String::new(), ..found.pop().unwrap_or_default() });
     }
-    Keypoints::new(points)
+    let keypoints = of_person(of, None)?.sized(of.size());
+    Ok(Person { keypoints, ..Person::default() })
 }
 
-fn confidence(c: &Node) -> Result<f64, KeypointsError> {
-    let wanted = "a confidence from 0 to 1";
-    let x = c.number(wanted)?;
-    if (0.0..=1.0).contains(&x) { Ok(x) } else { Err(c.wrong(wanted)) }
-}
-
-/// Reads COCO's `[x, y, v, …]`, three numbers per joint.
-fn triples(all: &Node, names: Option<&[String]>) -> Result<Keypoints, KeypointsError> {
-    let count = names.map_or(COCO.len(), <[String]>::len);
-    if all.len() != 3 * count || !all.value.is_array() {
-        return Err(
-            all.wrong(&format!("a list of {} numbers, x, y and v of {count} joints", 3 * count))
-        );
-    }
-    let numbers: Vec<f64> = all.items().map(|n| n.number("a number")).collect::<Result<_, _>>()?;
-    let mut points = Vec::new();
-    for (i, (joint, place)) in
-        numbers.chunks_exact(3).zip(all.items().skip(2).step_by(3)).enumerate()
-    {
-        let &[x, y, v] = joint else { continue };
-        if v < 0.0 {
-            return Err(place.wrong("0 for a joint that is missing, or more"));
-        }
-        if v > 0.0 {
-            let name = names
-                .and_then(|n| n.get(i))
-                .map_or(COCO.get(i).copied().unwrap_or_default(), String::as_str);
-            points.push(Keypoint::new(&*usual(name), [x, y], v.min(1.0)));
-        }
-    }
-    Keypoints::new(points)
-}
-
-/// Reads COCO's annotations or results; `root` has images and categories, if there are
-/// any.
-fn coco(all: &Node, root: &Node) -> Result<Vec<Person>, KeypointsError> {
-    if !all.value.is_array() {
-        return Err(all.wrong("a list of annotations"));
-    }
-    let categories = root.get("categories");
-    let images = root.get("images");
-    let with_id = |list: &Option<Node>, id: &Value| -> Option<Value> {
-        let found = list.as_ref()?.value.as_array()?.iter().find(|v| v.get("id") == Some(id));
-        found.cloned()
-    };
-    let mut people: Vec<Person> = Vec::new();
+/// Reads MMPose's `[{"frame_id", "instances": […]}, …]`.
+fn frames(all: &Node, names: Option<&[String]>) -> Result<Vec<Person>, KeypointsError> {
+    let mut people = Vec::new();
     for n in all.items() {
-        let Some(list) = n.get("keypoints") else { continue };
-        let category = n.get("category_id").and_then(|id| with_id(&categories, id.value));
-        let names: Option<Vec<String>> =
-            category.as_ref().and_then(|c| c.get("keypoints")).and_then(|names| {
-                names
-                    .as_array()?
-                    .iter()
-                    .map(|s| s.as_str().map(str::to_owned))
-                    .collect::<Option<Vec<_>>>()
-            });
-        let mut keypoints = triples(&list, names.as_deref())?;
-        let mut of_image = Vec::new();
-        if let Some(id) = n.get("image_id") {
-            of_image.push(id.id()?);
-            if let Some(image) = with_id(&images, id.value) {
-                keypoints = sized(keypoints, Node::root(&image).size());
-                let file = image.get("file_name").and_then(Value::as_str).map(std::path::Path::new);
-                of_image.extend(
-                    file.and_then(|f| f.file_stem()).and_then(|s| s.to_str()).map(str::to_owned),
-                );
-            }
-        }
-        let id = n.get("id").map(|id| id.id()).transpose()?.unwrap_or_default();
-        people.push(Person { id, image: of_image, keypoints });
+        let Some(instances) = n.get("instances") else {
+            return Err(n.wrong("a frame {\"frame_id\", \"instances\"}"));
+        };
+        let frame = n.get("frame_id").map(|id| id.id()).transpose()?.unwrap_or_default();
+        let found = coco::instances(&instances, names)?;
+        people.extend(found.into_iter().map(|p| p.of_picture(&frame)));
     }
     number(&mut people);
     Ok(people)
 }
 
-/// Gives people without an id that of the image, with `/1`, `/2`, … if it shows several
-/// people.
-fn number(people: &mut [Person]) {
-    let image = |p: &Person| p.image.first().cloned().unwrap_or_default();
-    let images: Vec<String> = people.iter().map(image).collect();
-    for (i, p) in people.iter_mut().enumerate().filter(|(_, p)| p.id.is_empty()) {
-        let of = &images[i];
-        let several = images.iter().filter(|o| *o == of).count() > 1;
-        let before = images[..i].iter().filter(|o| *o == of).count();
-        p.id = match (of.is_empty(), several) {
-            (true, _) => (before + 1).to_string(),
-            (false, true) => format!("{of}/{}", before + 1),
-            (false, false) => of.clone(),
-        };
+/// Reads a list with the people of each picture, which are numbered from 1 if there are several.
+fn pictures(all: &Node) -> Result<Vec<Person>, KeypointsError> {
+    let mut found = Vec::new();
+    for (i, n) in all.items().enumerate() {
+        let of_picture = people(&n)?.into_iter().map(|p| match all.len() {
+            1 => p,
+            _ => Person { id: String::new(), ..p }.of_picture(&(i + 1).to_string()),
+        });
+        found.extend(of_picture);
+    }
+    number(&mut found);
+    Ok(found)
+}
+
+/// Reads RTMLib's arrays, people x joints x 2 with confidences apart, or people x joints x 3, or
+/// those of one person; also the two arrays in a list.
+fn numbers(all: &Node, scores: Option<&Node>) -> Result<Vec<Person>, KeypointsError> {
+    let one = |n: &Node, scores: Option<&Node>| -> Result<Person, KeypointsError> {
+        Ok(Person { keypoints: rows(n, scores, None)?, ..Person::default() })
+    };
+    match depth(all.value).0 {
+        2 => Ok(vec![one(all, scores)?]),
+        3 => {
+            let by_person: Option<Vec<Node>> = scores.map(|s| s.items().collect());
+            if by_person.as_ref().is_some_and(|s| s.len() != all.len()) {
+                return Err(all.wrong("as long as its confidences"));
+            }
+            let score = |i: usize| by_person.as_ref().and_then(|s| s.get(i));
+            let each = all.items().enumerate().map(|(i, n)| one(&n, score(i)));
+            let mut people: Vec<Person> = each.collect::<Result<_, _>>()?;
+            if people.len() > 1 {
+                number(&mut people);
+            }
+            Ok(people)
+        }
+        4 => match &all.items().collect::<Vec<_>>()[..] {
+            [positions, scores] => numbers(positions, Some(scores)),
+            _ => Err(unknown(all)),
+        },
+        _ => Err(unknown(all)),
     }
 }
 
-/// Reads MediaPipe's landmarks: 33 of them, or a list of them per person. Ids are 1, 2,
-/// ….
-fn mediapipe(all: &Node, size: Option<(u32, u32)>) -> Result<Vec<Person>, KeypointsError> {
-    // The older interface has one more level.
-    let inner = all.get("landmark");
-    let all = inner.as_ref().unwrap_or(all);
-    let lists: Vec<Node> = match all.value {
-        Value::Null => return Ok(vec![Person::default()]),
-        Value::Array(items) if items.first().is_some_and(Value::is_array) => all.items().collect(),
-        Value::Array(items) if items.is_empty() => return Ok(vec![Person::default()]),
-        Value::Array(_) => vec![all.clone()],
-        _ => return Err(all.wrong("a list of 33 landmarks")),
-    };
-    let several = lists.len() > 1;
-    let one = |(i, list): (usize, &Node)| {
-        let id = if several { (i + 1).to_string() } else { String::new() };
-        Ok(Person { id, image: Vec::new(), keypoints: sized(landmarks(list)?, size) })
-    };
-    lists.iter().enumerate().map(one).collect()
+/// Returns how deep lists are nested, along the first element of each other than an empty list,
+/// and what is innermost.
+fn depth(value: &Value) -> (usize, &Value) {
+    let (mut at, mut deep) = (value, 0);
+    while let Value::Array(list) = at {
+        deep += 1;
+        let full = |v: &&Value| v.as_array().is_none_or(|list| !list.is_empty());
+        match list.iter().find(full).or(list.first()) {
+            Some(inner) => at = inner,
+            None => break,
+        }
+    }
+    (deep, at)
 }
 
-fn landmarks(list: &Node) -> Result<Keypoints, KeypointsError> {
-    if list.len() != MEDIAPIPE.len() {
-        return Err(list.wrong("a list of 33 landmarks {\"x\": …, \"y\": …, \"visibility\": …}"));
+/// Makes positions fractions of the picture's sides, if all of all people are from 0 to 1: some
+/// tools write either, and do not say which.
+pub(super) fn fractions_if_small(people: &mut [Person]) {
+    let points = || people.iter().flat_map(|p| p.keypoints.points());
+    let small = |x: f64| (0.0..=1.0).contains(&x);
+    if points().next().is_some() && points().all(|p| small(p.x) && small(p.y)) {
+        for p in people {
+            p.keypoints = std::mem::take(&mut p.keypoints).into_normalised();
+        }
     }
-    let mut points = Vec::new();
-    for (n, name) in list.items().zip(MEDIAPIPE) {
-        let coordinate = |key: &str| match n.get(key) {
-            Some(x) => x.number("a fraction of the image's side"),
-            None => Err(n.wrong("a landmark {\"x\": …, \"y\": …, \"visibility\": …}")),
-        };
-        let confidence = n.get("visibility").map_or(Ok(1.0), |c| confidence(&c))?;
-        points.push(Keypoint::new(name, [coordinate("x")?, coordinate("y")?], confidence));
+}
+
+/// Whether this is `{"x": [x of each joint], "y": …}`, Ultralytics' form.
+pub(super) fn of_ultralytics(person: &Node) -> bool {
+    person.get("keypoints").is_some_and(|n| is_columns(&n))
+}
+
+impl Keypoints {
+    /// Records the size of the picture, if the file has it.
+    pub(super) fn sized(self, size: Option<(u32, u32)>) -> Keypoints {
+        match size {
+            Some((w, h)) => self.in_image(w, h),
+            None => self,
+        }
     }
-    Keypoints::new(points).map(Keypoints::into_normalised)
 }
 
 #[cfg(test)]

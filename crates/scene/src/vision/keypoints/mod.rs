@@ -6,32 +6,34 @@
 //! Invariant of [`Keypoints`]: names are unique, numbers finite, and confidences in
 //! 0..=1.
 //!
-//! [`People::parse`] reads the following layouts and distinguishes them by their shape.
-//! `null` for a person means that nobody was detected, and for a joint that it was not;
-//! the confidence is from 0 to 1 and optional:
-//!
-//! * one person: `{"nose": [x, y, confidence], …}`, or the same under `"keypoints"`;
-//! * many by id: `{"ID": {"keypoints": {"nose": [x, y, confidence], …}}, …}`;
-//! * COCO:
-//!   `{"annotations": [{"keypoints": [x, y, v, …], "id": …, "image_id": …}], "images": …, "categories": …}`
-//!   or the list of results `[{"image_id": …, "keypoints": [x, y, v, …]}]`, with v = 0
-//!   for a joint that is missing and v above 1 counting as 1;
-//! * MediaPipe: `{"pose_landmarks": [33 of {"x", "y", "visibility"}]}`, also called
-//!   `"landmarks"`, also one such list per person; x and y as fractions of the image's
-//!   width and height.
+//! [`People::parse`] reads the layouts of `docs/reference/formats.md` and distinguishes them by
+//! their shape: joints by name, and the output of OpenPose, MMPose, AlphaPose, Ultralytics, RTMLib,
+//! MediaPipe, DeepLabCut, SLEAP, and COCO with what resembles it. Joints without names are in one
+//! of the orders of `joint_lists.rs`. `null` for a person means that nobody was detected, and for
+//! a joint that it was not; the confidence is from 0 to 1, more counts as 1, and is optional.
 //!
 //! `"width"` and `"height"`, beside `"keypoints"` or in COCO's `"images"`, give the size
 //! of the image in whose pixels the positions are.
 
+mod arrays;
+mod coco;
+mod joint_lists;
+mod joints;
+mod labels;
 mod layouts;
 mod likelihood;
+mod mediapipe;
 mod names;
 mod node;
+mod openpose;
 mod people;
 mod relative_depth;
+mod tables;
 
 #[cfg(test)]
 mod calibration_tests;
+#[cfg(test)]
+mod formats_tests;
 
 pub use likelihood::{Detection, DetectionConstants, KeypointLikelihood, KeypointOptions, Unit};
 pub use names::{COCO, MEDIAPIPE, matching};
@@ -39,6 +41,7 @@ pub use node::KeypointsError;
 pub use people::{People, split_id};
 pub use relative_depth::RelativeDepthLikelihood;
 
+use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
 /// A detected joint.
@@ -97,8 +100,9 @@ impl Keypoints {
     /// # Errors
     /// If a name occurs twice, a position is not finite, or a confidence is not in 0..=1.
     pub fn new(points: Vec<Keypoint>) -> Result<Keypoints, KeypointsError> {
-        for (i, p) in points.iter().enumerate() {
-            if points[..i].iter().any(|q| q.name == p.name) {
+        let mut names = FxHashSet::default();
+        for p in &points {
+            if !names.insert(&p.name) {
                 return Err(KeypointsError::new(format!("the keypoint `{}` occurs twice", p.name)));
             }
             if !(p.x.is_finite() && p.y.is_finite()) {

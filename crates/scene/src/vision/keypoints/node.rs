@@ -81,6 +81,11 @@ impl<'a> Node<'a> {
         self.value.as_array().map_or(0, Vec::len)
     }
 
+    /// The place in the file, for messages.
+    pub fn place(&self) -> String {
+        if self.path.is_empty() { "the file".to_owned() } else { format!("`{}`", self.path) }
+    }
+
     /// Returns the error that this is not the expected value.
     pub fn wrong(&self, wanted: &str) -> KeypointsError {
         let got = match self.value {
@@ -92,14 +97,25 @@ impl<'a> Node<'a> {
             Value::Array(a) => format!("a list of {}", a.len()),
             Value::Object(_) => "an object".to_owned(),
         };
-        let place =
-            if self.path.is_empty() { "the file".to_owned() } else { format!("`{}`", self.path) };
-        KeypointsError::new(format!("{place} must be {wanted}, got {got}"))
+        KeypointsError::new(format!("{} must be {wanted}, got {got}", self.place()))
     }
 
     /// Returns a finite number.
     pub fn number(&self, wanted: &str) -> Result<f64, KeypointsError> {
         self.value.as_f64().filter(|x| x.is_finite()).ok_or_else(|| self.wrong(wanted))
+    }
+
+    /// Returns the numbers of a list, NaN for null.
+    pub fn numbers(&self, wanted: &str) -> Result<Vec<f64>, KeypointsError> {
+        let Value::Array(values) = self.value else { return Err(self.wrong(wanted)) };
+        let number = |(i, v): (usize, &Value)| match v {
+            Value::Null => Ok(f64::NAN),
+            _ => v
+                .as_f64()
+                .filter(|x| x.is_finite())
+                .ok_or_else(|| self.items().nth(i).unwrap_or_else(|| self.clone()).wrong(wanted)),
+        };
+        values.iter().enumerate().map(number).collect()
     }
 
     /// Returns a string, or a number as it is written.

@@ -2,6 +2,8 @@
 
 use super::node::first;
 use super::{Keypoints, KeypointsError};
+use rustc_hash::FxHashMap;
+use std::path::Path;
 
 /// The people of a file, in the order of the file.
 #[derive(Clone, Debug, Default)]
@@ -14,20 +16,75 @@ pub struct People {
 pub(super) struct Person {
     /// The person's id; empty if the file has a single person.
     pub id: String,
-    /// Ids that people in the same image share: the image's number and file name.
+    /// The name among the people of the same image, if the file has one for them.
+    pub within: String,
+    /// Ids that people in the same image share: the image's number or name, and file name.
     pub image: Vec<String>,
     pub keypoints: Keypoints,
 }
 
-/// Splits a path with `#ID`, which picks a person from the file, into path and id.
+impl Person {
+    /// Adds an id of the picture, and if it is a path, the names of the file with and without its
+    /// extension.
+    pub fn of_picture(mut self, id: &str) -> Person {
+        if id.is_empty() {
+            return self;
+        }
+        self.image.push(id.to_owned());
+        let file = id.rsplit(['/', '\\']).next().unwrap_or(id);
+        let stem = Path::new(file).file_stem().and_then(|s| s.to_str()).unwrap_or(file);
+        for name in [file, stem] {
+            if !self.image.iter().any(|i| i == name) {
+                self.image.push(name.to_owned());
+            }
+        }
+        self
+    }
+}
+
+/// Gives people without an id that of the image, with `:` and the name or number of the person if
+/// it shows several people.
+pub(super) fn number(people: &mut [Person]) {
+    let image = |p: &Person| p.image.first().cloned().unwrap_or_default();
+    let mut count: FxHashMap<String, usize> = FxHashMap::default();
+    for p in people.iter() {
+        *count.entry(image(p)).or_default() += 1;
+    }
+    let mut before: FxHashMap<String, usize> = FxHashMap::default();
+    for p in people {
+        let of = image(p);
+        let several = count.get(&of).is_some_and(|n| *n > 1);
+        let place = before.entry(of.clone()).or_default();
+        *place += 1;
+        if !p.id.is_empty() {
+            continue;
+        }
+        let own = if p.within.is_empty() { place.to_string() } else { p.within.clone() };
+        p.id = match (of.is_empty(), several) {
+            (true, _) => own,
+            (false, true) => format!("{of}:{own}"),
+            (false, false) => of,
+        };
+    }
+}
+
+/// Splits a path with `#ID`, which picks a person from the file, into path and id. The id has a
+/// slash (as pictures' paths have) only after a file with an extension of this kind.
 pub fn split_id(path: &str) -> (&str, Option<&str>) {
+    let extension = |file: &str| EXTENSIONS.iter().any(|e| file.to_lowercase().ends_with(e));
     match path.rsplit_once('#') {
-        Some((file, id)) if !file.is_empty() && !id.is_empty() && !id.contains(['/', '\\']) => {
+        Some((file, id))
+            if !file.is_empty()
+                && !id.is_empty()
+                && (!id.contains(['/', '\\']) || extension(file)) =>
+        {
             (file, Some(id))
         }
         _ => (path, None),
     }
 }
+
+const EXTENSIONS: [&str; 5] = [".json", ".csv", ".txt", ".npy", ".npz"];
 
 impl People {
     /// The number of people, including those that were searched for but not detected.

@@ -41,6 +41,16 @@ impl NpyArray {
         }
     }
 
+    /// Converts the numbers to float64 (false is 0, true is 1).
+    pub fn into_f64(self) -> Vec<f64> {
+        match self.data {
+            NpyData::F32(v) => v.into_iter().map(f64::from).collect(),
+            NpyData::F64(v) => v,
+            NpyData::U8(v) => v.into_iter().map(f64::from).collect(),
+            NpyData::Bool(v) => v.into_iter().map(|x| f64::from(u8::from(x))).collect(),
+        }
+    }
+
     /// Returns width and height of an array of rows (also of shape height x width x 1).
     pub fn picture_size(&self) -> Result<(u32, u32), VisionError> {
         match self.shape[..] {
