@@ -6,7 +6,8 @@ use super::morphs;
 use crate::geom::{GeomError, Solid};
 
 /// Returns the bytes of a `.glb` file that plays states one after another, `seconds`
-/// apart. Vertices move by morph targets; where the triangles change between two states, one mesh is replaced by another.
+/// apart; what does not play it shows the last of them. Vertices move by morph targets; where
+/// the triangles change between two states, one mesh is replaced by another.
 ///
 /// # Errors
 /// If there are no states, or one has no mesh.
@@ -27,7 +28,7 @@ mod tests {
     use super::*;
     use crate::geom::{Affine, cuboid, sphere};
     use glam::{DVec3, Vec3};
-    use serde_json::Value;
+    use serde_json::{Value, json};
     use std::sync::Arc;
 
     fn json_of(glb: &[u8]) -> Value {
@@ -56,18 +57,23 @@ mod tests {
         let d = json_of(&glb);
         let targets = d["meshes"][0]["primitives"][0]["targets"].as_array().unwrap();
         assert_eq!((targets.len(), d["nodes"].as_array().unwrap().len()), (2, 1));
+        // From the last state, which is shown at rest.
         let moved = floats(&glb, &d, &targets[1]["POSITION"], 3);
-        assert!(moved.chunks_exact(3).all(|v| Vec3::from_slice(v).distance(3.0 * Vec3::X) < 1e-5));
+        assert!(moved.chunks_exact(3).all(|v| Vec3::from_slice(v).distance(-3.0 * Vec3::X) < 1e-5));
+        let base = &d["meshes"][0]["primitives"][0]["attributes"]["POSITION"];
+        let rest = floats(&glb, &d, base, 3);
+        let centre = rest.chunks_exact(3).map(|v| v[0]).sum::<f32>() / (rest.len() / 3) as f32;
+        assert!((centre - 3.0).abs() < 1e-4 && d["meshes"][0]["weights"] == json!([0.0, 0.0]));
         let sampler = &d["animations"][0]["samplers"][0];
         assert_eq!(floats(&glb, &d, &sampler["input"], 1), [0.0, 0.5, 1.0]);
-        assert_eq!(floats(&glb, &d, &sampler["output"], 1), [0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+        assert_eq!(floats(&glb, &d, &sampler["output"], 1), [0.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
     }
 
     #[test]
     fn other_triangles_are_another_mesh() {
         let ball = Solid::new(Arc::new(sphere(1.0, 8).unwrap()));
         let cube = Solid::new(Arc::new(cuboid(DVec3::ONE).unwrap()));
-        let glb = write_animation(&[ball.clone(), cube, ball], 1.0).unwrap();
+        let glb = write_animation(&[ball.clone(), cube, ball.clone()], 1.0).unwrap();
         let d = json_of(&glb);
         assert_eq!(d["meshes"].as_array().unwrap().len(), 2);
         let shown = |node: u64| {
@@ -78,6 +84,11 @@ mod tests {
             floats(&glb, &d, output, 3).iter().step_by(3).copied().collect::<Vec<_>>()
         };
         assert_eq!((shown(0), shown(1)), (vec![1.0, 0.0, 1.0], vec![0.0, 1.0, 0.0]));
+        assert_eq!((&d["nodes"][0]["scale"], &d["nodes"][1]["scale"]), (&json!([1, 1, 1]), &json!([0, 0, 0])));
+        assert_eq!(d["nodes"][1]["name"], "object_earlier_1");
+        let pair = Solid::named_group(&[ball.clone(), ball], vec!["a".into(), "b".into()]);
+        let d = json_of(&write_animation(&[pair.clone(), pair], 1.0).unwrap());
+        assert_eq!((&d["nodes"][0]["name"], &d["meshes"][1]["name"]), (&json!("a"), &json!("b")));
         assert!(write_animation(&[], 1.0).is_err());
     }
 }
