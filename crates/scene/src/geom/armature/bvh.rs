@@ -125,7 +125,10 @@ fn degrees(m: DMat3) -> DVec3 {
 }
 
 fn three(v: DVec3) -> String {
-    format!("{} {} {}", number(v.x), number(v.y), number(v.z))
+    // What rounding leaves of a zero.
+    let least = 1e-12 * v.abs().max_element();
+    let [x, y, z] = v.to_array().map(|x| number(if x.abs() > least { x } else { 0.0 }));
+    format!("{x} {y} {z}")
 }
 
 /// Ten significant digits without an exponent, which some readers do not know.

@@ -5,8 +5,13 @@ use super::document::Document;
 use super::morphs;
 use crate::geom::{GeomError, Solid};
 
+/// How long the last state is shown before the first, in seconds, and the time of the cut.
+const OPENING: f64 = 1.0;
+const CUT: f64 = 1e-3;
+
 /// Returns the bytes of a `.glb` file that plays states one after another, `seconds`
-/// apart; what does not play it shows the last of them. Vertices move by morph targets; where
+/// apart. It opens with the last of them for a second, which is also what it shows at rest:
+/// programs that import an animation stop at its beginning. Vertices move by morph targets; where
 /// the triangles change between two states, one mesh is replaced by another.
 ///
 /// # Errors
@@ -16,9 +21,13 @@ pub fn write_animation(states: &[Solid], seconds: f64) -> Result<Vec<u8>, GeomEr
         return Err(GeomError::domain("there are no states to animate"));
     }
     let mut d = Document::default();
-    let times: Vec<f32> = (0..states.len()).map(|i| (i as f64 * seconds) as f32).collect();
+    let last = states.len() - 1;
+    let way = (0..=last).map(|i| (i, OPENING + i as f64 * seconds));
+    let (shown, times): (Vec<usize>, Vec<f64>) =
+        [(last, 0.0), (last, OPENING - CUT)].into_iter().chain(way).unzip();
+    let times: Vec<f32> = times.into_iter().map(|t| t as f32).collect();
     let mut animation = Animation::at(d.numbers(&times));
-    morphs::add(&mut d, &mut animation, states)?;
+    morphs::add(&mut d, &mut animation, states, &shown)?;
     d.animation(animation.finish());
     Ok(d.finish())
 }
@@ -65,8 +74,10 @@ mod tests {
         let centre = rest.chunks_exact(3).map(|v| v[0]).sum::<f32>() / (rest.len() / 3) as f32;
         assert!((centre - 3.0).abs() < 1e-4 && d["meshes"][0]["weights"] == json!([0.0, 0.0]));
         let sampler = &d["animations"][0]["samplers"][0];
-        assert_eq!(floats(&glb, &d, &sampler["input"], 1), [0.0, 0.5, 1.0]);
-        assert_eq!(floats(&glb, &d, &sampler["output"], 1), [0.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
+        assert_eq!(floats(&glb, &d, &sampler["input"], 1), [0.0, 0.999, 1.0, 1.5, 2.0]);
+        assert_eq!(floats(&glb, &d, &sampler["output"], 1), [
+            [0.0, 0.0], [0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0],
+        ].concat());
     }
 
     #[test]
@@ -83,7 +94,7 @@ mod tests {
             let output = &d["animations"][0]["samplers"][at]["output"];
             floats(&glb, &d, output, 3).iter().step_by(3).copied().collect::<Vec<_>>()
         };
-        assert_eq!((shown(0), shown(1)), (vec![1.0, 0.0, 1.0], vec![0.0, 1.0, 0.0]));
+        assert_eq!((shown(0), shown(1)), (vec![1.0, 1.0, 1.0, 0.0, 1.0], vec![0.0, 0.0, 0.0, 1.0, 0.0]));
         assert_eq!((&d["nodes"][0]["scale"], &d["nodes"][1]["scale"]), (&json!([1, 1, 1]), &json!([0, 0, 0])));
         assert_eq!(d["nodes"][1]["name"], "object_earlier_1");
         let pair = Solid::named_group(&[ball.clone(), ball], vec!["a".into(), "b".into()]);

@@ -7,8 +7,14 @@ use crate::geom::{GeomError, Mesh, Object, Solid};
 use glam::Vec3;
 use serde_json::{Value, json};
 
-/// Adds nodes for each set of triangles that the states have, one for each object.
-pub fn add(d: &mut Document, animation: &mut Animation, states: &[Solid]) -> Result<(), GeomError> {
+/// Adds nodes for each set of triangles that the states have, one for each object. The
+/// animation shows the states of these numbers.
+pub fn add(
+    d: &mut Document,
+    animation: &mut Animation,
+    states: &[Solid],
+    shown: &[usize],
+) -> Result<(), GeomError> {
     let states: Vec<Vec<Object>> = states.iter().map(Solid::objects).collect::<Result<_, _>>()?;
     // The states with the same triangles, the last first.
     let mut groups: Vec<Vec<usize>> = Vec::new();
@@ -20,14 +26,14 @@ pub fn add(d: &mut Document, animation: &mut Animation, states: &[Solid]) -> Res
     }
     for (number, group) in groups.iter().enumerate() {
         // While other meshes are shown, the weights do not matter.
-        let weight = |state: usize| {
-            let own = group.iter().position(|i| *i == state);
+        let weight = |state: &usize| {
+            let own = group.iter().position(|i| i == state);
             (1..group.len()).map(move |k| if own == Some(k) { 1.0 } else { 0.0 })
         };
-        let weights: Vec<f32> = (0..states.len()).flat_map(weight).collect();
+        let weights: Vec<f32> = shown.iter().flat_map(weight).collect();
         let weights = (group.len() > 1).then(|| d.numbers(&weights));
-        let shown = |state: usize| if group.contains(&state) { Vec3::ONE } else { Vec3::ZERO };
-        let scales: Vec<Vec3> = (0..states.len()).map(shown).collect();
+        let scale = |state: &usize| if group.contains(state) { Vec3::ONE } else { Vec3::ZERO };
+        let scales: Vec<Vec3> = shown.iter().map(scale).collect();
         let scales = (groups.len() > 1).then(|| d.animated_vectors(&scales));
         for (k, base) in states[group[0]].iter().enumerate() {
             let targets: Vec<&Mesh> = group[1..].iter().map(|i| &states[*i][k].mesh).collect();
