@@ -57,7 +57,10 @@ fn pixels(segmentation: &Value) -> Vec<bool> {
         runs.push(run);
     }
     assert_eq!(columns.len(), width * height);
-    (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| columns[x * height + y]).collect()
+    (0..height)
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        .map(|(x, y)| columns[x * height + y])
+        .collect()
 }
 
 #[test]

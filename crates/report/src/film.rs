@@ -31,11 +31,7 @@ pub fn apng(frames: &[FilmFrame], still: &RgbImage) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
-fn encode(
-    out: &mut Vec<u8>,
-    frames: &[FilmFrame],
-    still: &RgbImage,
-) -> Result<(), EncodingError> {
+fn encode(out: &mut Vec<u8>, frames: &[FilmFrame], still: &RgbImage) -> Result<(), EncodingError> {
     let (width, height) = still.dimensions();
     let mut encoder = Encoder::new(out, width, height);
     encoder.set_color(ColorType::Rgba);

@@ -149,7 +149,8 @@ fn mediapipe(body: &PosedBody, camera: &Camera, scale: f64) -> Option<Value> {
     let hips = find("l_hip")?.midpoint(find("r_hip")?);
     let one = |name: &&str| {
         let at = find(name).map_or(DVec3::ZERO, |at| (at - hips) * scale);
-        let [x, y, z] = [camera.right, -camera.up, camera.forward].map(|axis| rounded(axis.dot(at)));
+        let [x, y, z] =
+            [camera.right, -camera.up, camera.forward].map(|axis| rounded(axis.dot(at)));
         let visibility = if find(name).is_some() { 1 } else { 0 };
         json!({ "x": x, "y": y, "z": z, "visibility": visibility })
     };

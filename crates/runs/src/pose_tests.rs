@@ -45,7 +45,8 @@ fn rotations_lead_to_the_joints() {
     let mut worlds: Vec<(DMat3, DVec3)> = Vec::new();
     for (i, joint) in all.iter().enumerate() {
         let own = turn(&joint["rotvec"]);
-        let q: Vec<f64> = joint["quaternion"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+        let q: Vec<f64> =
+            joint["quaternion"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
         let same = DMat3::from_quat(DQuat::from_xyzw(q[1], q[2], q[3], q[0])) - own;
         assert!(same.to_cols_array().iter().all(|x| x.abs() < 1e-9));
         let place = match joint["parent"].as_str() {
@@ -103,9 +104,8 @@ fn landmarks_are_metres_from_the_hips() {
     };
     assert_eq!(said.as_array().unwrap().len(), 33);
     assert!((at("l_hip").0 + at("r_hip").0).length() < 1e-9);
-    let landmark = |name: &str| {
-        view.solid().landmarks().iter().find(|l| &*l.name == name).unwrap().position
-    };
+    let landmark =
+        |name: &str| view.solid().landmarks().iter().find(|l| &*l.name == name).unwrap().position;
     let apart = (landmark("nose") - landmark("l_hip").midpoint(landmark("r_hip"))) / 2.0;
     // Right, down, away.
     assert!(at("nose").0.distance(DVec3::new(apart.x, -apart.y, -apart.z)) < 1e-9);
@@ -121,7 +121,10 @@ fn files_of_every_body() {
       let view = scene.render(scene.group({ a: one, b: scene.affine(translate = [2, 0, 0]) * one }));";
     write_poses(&dir, &view(two)).unwrap();
     let said: Value = serde_json::from_slice(&std::fs::read(path.join(POSE)).unwrap()).unwrap();
-    assert_eq!((&said["unit"], &said["bodies"][1]["bvh"]), (&json!("scene unit"), &json!("pose-2.bvh")));
+    assert_eq!(
+        (&said["unit"], &said["bodies"][1]["bvh"]),
+        (&json!("scene unit"), &json!("pose-2.bvh"))
+    );
     assert!(said["bodies"][0].get("pose_world_landmarks").is_none());
     let text = std::fs::read_to_string(path.join("pose-2.bvh")).unwrap();
     assert!(text.starts_with("HIERARCHY\nROOT pelvis\n") && text.matches("JOINT").count() == 21);

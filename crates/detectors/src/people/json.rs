@@ -9,12 +9,7 @@ use serde_json::{Map, Value, json};
 /// with the visibility as third number, box and score. In addition, `landmarks` has all
 /// 33 by name (x, y, visibility, standard deviation in pixels), and `metres` their
 /// positions relative to the hips.
-pub fn coco(
-    people: &[Person],
-    (width, height): (u32, u32),
-    name: &str,
-    image_id: u64,
-) -> Value {
+pub fn coco(people: &[Person], (width, height): (u32, u32), name: &str, image_id: u64) -> Value {
     let annotation = |(i, p): (usize, &Person)| {
         let [left, top, right, bottom] = p.bounds;
         let joints: Vec<Value> = COCO.iter().flat_map(|name| triple(p.landmark(name))).collect();

@@ -245,7 +245,7 @@ pub fn write(objects: &[Object]) -> String {
             if group != Some(*part) {
                 let _ = match t.part_names.get(usize::from(*part)).filter(|n| !n.is_empty()) {
                     Some(own) => writeln!(s, "g {}", on_one_line(own)),
-                    None => writeln!(s, "g {}.{part}", on_one_line(name)),
+                    None => writeln!(s, "g {}_part{part}", on_one_line(name)),
                 };
                 group = Some(*part);
             }

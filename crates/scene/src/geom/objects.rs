@@ -1,7 +1,8 @@
 //! Solids as files have them: objects with names, a mesh each.
 //!
 //! The members of a group are objects; a mesh from a file is one for each part that has a name.
-//! A body is one object, whatever its parts. Invariants: names differ and are not empty.
+//! A body is one object, whatever its parts. Names within names are joined by `_`, since
+//! three.js drops points. Invariants: names differ and are not empty.
 
 use super::mesh::MOST_TRIANGLES;
 use super::{GeomError, Instance, Mesh, Solid, Topology};
@@ -42,7 +43,8 @@ impl Solid {
         for own in self.instances().chunk_by(|a, b| a.object == b.object) {
             // Its own numbers of parts begin with 0.
             let first = own.iter().map(|i| i.first_part).min().unwrap_or(0);
-            let renumbered = |i: &Instance| Instance { first_part: i.first_part - first, ..i.clone() };
+            let renumbered =
+                |i: &Instance| Instance { first_part: i.first_part - first, ..i.clone() };
             match Solid::of(own.iter().map(renumbered).collect()).to_mesh() {
                 Ok(mesh) => {
                     let name = own[0].name.as_deref();
@@ -84,7 +86,7 @@ fn by_part(mesh: &Mesh, within: Option<&str>, objects: &mut Vec<(Option<String>,
             (None, "") => None,
             (Some(within), "") => Some(within.to_owned()),
             (None, name) => Some(name.to_owned()),
-            (Some(within), name) => Some(format!("{within}.{name}")),
+            (Some(within), name) => Some(format!("{within}_{name}")),
         };
         objects.push((own, taken(mesh, &faces[name])));
     }
@@ -153,21 +155,22 @@ mod tests {
         let all = Solid::named_group(&all, ["lamp", "shelf", "shelf_2"].map(Into::into).to_vec());
         assert_eq!(names(&all.placed(by)), ["lamp", "shelf", "shelf_2", "shelf_2_2"]);
         let outer = Solid::named_group(&[all], vec!["room".into()]);
-        assert_eq!(names(&outer)[..2], ["room.lamp", "room.shelf"]);
+        assert_eq!(names(&outer)[..2], ["room_lamp", "room_shelf"]);
         let second = &outer.objects().unwrap()[2].mesh;
         assert!((second.bounds().unwrap().centre() - DVec3::new(6.0, 1.0, 0.0)).length() < 1e-5);
     }
 
     #[test]
     fn parts_of_files_keep_their_names() {
-        let text = "o foot\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\no shade\nf 1 2 4\nf 2 3 4\n";
+        let text =
+            "o foot\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\no shade\nf 1 2 4\nf 2 3 4\n";
         let lamp = Solid::new(Arc::new(obj::load(text.as_bytes()).unwrap()));
         assert_eq!(names(&lamp), ["foot", "shade"]);
         let faces: Vec<usize> =
             lamp.objects().unwrap().iter().map(|o| o.mesh.topology.triangles.len()).collect();
         assert_eq!(faces, [1, 2]);
         let two = Solid::named_group(&[lamp.clone(), lamp], vec!["left".into(), "right".into()]);
-        assert_eq!(names(&two), ["left.foot", "left.shade", "right.foot", "right.shade"]);
+        assert_eq!(names(&two), ["left_foot", "left_shade", "right_foot", "right_shade"]);
         // Parts without names are one object.
         let profile = |y: [f64; 2], r: f64| Profile { y: y.to_vec(), r: vec![r, r] };
         let steps = [profile([0.0, 1.0], 0.5), profile([1.0, 2.0], 0.3)];

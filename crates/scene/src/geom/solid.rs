@@ -543,7 +543,7 @@ impl Solid {
 /// Returns the name of an object of a group's member.
 fn within(member: Option<&Arc<str>>, own: Option<&Arc<str>>) -> Option<Arc<str>> {
     match (member, own) {
-        (Some(member), Some(own)) => Some(format!("{member}.{own}").into()),
+        (Some(member), Some(own)) => Some(format!("{member}_{own}").into()),
         (name, own) => name.or(own).cloned(),
     }
 }

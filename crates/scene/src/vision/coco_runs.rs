@@ -75,8 +75,13 @@ mod tests {
             x * x + y * y < 1.0
         };
         let text = counts(200, 300, oval);
-        assert!(text.starts_with("dX6Y1k7`0B<E:F:G8H8I6J6J6J6J6K4L4K6K4L4L4L4M2M4L4M2M4M2M4M2N2M4M2N2N2N2N2N2N2N2N"));
+        assert!(text.starts_with(
+            "dX6Y1k7`0B<E:F:G8H8I6J6J6J6J6K4L4K6K4L4L4L4M2M4L4M2M4M2M4M2N2M4M2N2N2N2N2N2N2N2N"
+        ));
         assert_eq!(text.len(), 286);
-        assert_eq!((counts(3, 2, |_, _| true), counts(3, 2, |_, _| false)), ("06".into(), "6".into()));
+        assert_eq!(
+            (counts(3, 2, |_, _| true), counts(3, 2, |_, _| false)),
+            ("06".into(), "6".into())
+        );
     }
 }

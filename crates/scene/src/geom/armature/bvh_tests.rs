@@ -132,7 +132,8 @@ fn pose(by: f64) -> Vec<JointPose> {
 #[test]
 fn joints_are_where_the_body_has_them() {
     let body = body(Vec::new());
-    let place = Affine::new(DVec3::new(1.0, -2.0, 0.5), DVec3::new(0.2, 1.1, -0.4), DVec3::splat(3.0));
+    let place =
+        Affine::new(DVec3::new(1.0, -2.0, 0.5), DVec3::new(0.2, 1.1, -0.4), DVec3::splat(3.0));
     let stands = |by: f64| body.posed(&pose(by), &Rules::default()).unwrap().placed(place);
     let frames: Vec<Vec<Bone>> = [0.7, -1.3].map(|by| bones(&stands(by))).to_vec();
     let text = write(&frames, 0.5);

@@ -72,9 +72,8 @@ impl PosedBody {
 
     /// Returns where the rig's named points are in the scene.
     pub fn keypoints(&self) -> impl Iterator<Item = (&str, DVec3)> {
-        let at = |rest: DVec3, joint: usize| {
-            self.place.point(self.joints[joint].transform_point3(rest))
-        };
+        let at =
+            |rest: DVec3, joint: usize| self.place.point(self.joints[joint].transform_point3(rest));
         self.body.rig().keypoints().iter().map(move |k| (&*k.name, at(k.rest, k.joint)))
     }
 }
@@ -107,7 +106,8 @@ fn nearest_rotation(m: DMat3) -> Option<DMat3> {
     let mut x = m * (1.0 / libm::cbrt(det));
     for _ in 0..60 {
         let next = (x + x.inverse().transpose()) * 0.5;
-        let moved = (next - x).to_cols_array().into_iter().fold(0.0, |most: f64, d| most.max(d.abs()));
+        let moved =
+            (next - x).to_cols_array().into_iter().fold(0.0, |most: f64, d| most.max(d.abs()));
         x = next;
         if moved < 1e-15 {
             break;

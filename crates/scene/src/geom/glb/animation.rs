@@ -75,9 +75,10 @@ mod tests {
         assert!((centre - 3.0).abs() < 1e-4 && d["meshes"][0]["weights"] == json!([0.0, 0.0]));
         let sampler = &d["animations"][0]["samplers"][0];
         assert_eq!(floats(&glb, &d, &sampler["input"], 1), [0.0, 0.999, 1.0, 1.5, 2.0]);
-        assert_eq!(floats(&glb, &d, &sampler["output"], 1), [
-            [0.0, 0.0], [0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0],
-        ].concat());
+        assert_eq!(
+            floats(&glb, &d, &sampler["output"], 1),
+            [[0.0, 0.0], [0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0],].concat()
+        );
     }
 
     #[test]
@@ -94,8 +95,14 @@ mod tests {
             let output = &d["animations"][0]["samplers"][at]["output"];
             floats(&glb, &d, output, 3).iter().step_by(3).copied().collect::<Vec<_>>()
         };
-        assert_eq!((shown(0), shown(1)), (vec![1.0, 1.0, 1.0, 0.0, 1.0], vec![0.0, 0.0, 0.0, 1.0, 0.0]));
-        assert_eq!((&d["nodes"][0]["scale"], &d["nodes"][1]["scale"]), (&json!([1, 1, 1]), &json!([0, 0, 0])));
+        assert_eq!(
+            (shown(0), shown(1)),
+            (vec![1.0, 1.0, 1.0, 0.0, 1.0], vec![0.0, 0.0, 0.0, 1.0, 0.0])
+        );
+        assert_eq!(
+            (&d["nodes"][0]["scale"], &d["nodes"][1]["scale"]),
+            (&json!([1, 1, 1]), &json!([0, 0, 0]))
+        );
         assert_eq!(d["nodes"][1]["name"], "object_earlier_1");
         let pair = Solid::named_group(&[ball.clone(), ball], vec!["a".into(), "b".into()]);
         let d = json_of(&write_animation(&[pair.clone(), pair], 1.0).unwrap());
