@@ -4,7 +4,7 @@ use crate::errors::plain;
 use crate::values::{Adjoint, numbers, picture};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pcadlang_library::scene::SceneView;
-use pcadlang_scene::geom::{Mesh, glb, obj};
+use pcadlang_scene::geom::{Mesh, Object, glb, obj};
 use pcadlang_scene::render;
 use pcadlang_workbench::session::over;
 use pyo3::exceptions::PyValueError;
@@ -195,6 +195,10 @@ impl Solid {
     fn meshed(&self, py: Python<'_>) -> PyResult<Mesh> {
         py.detach(|| self.0.to_mesh()).map_err(plain)
     }
+
+    fn objects(&self, py: Python<'_>) -> PyResult<Vec<Object>> {
+        py.detach(|| self.0.objects()).map_err(plain)
+    }
 }
 
 #[pymethods]
@@ -213,12 +217,12 @@ impl Solid {
 
     /// Its mesh as the text of an OBJ file.
     fn obj(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(obj::write(&self.meshed(py)?))
+        Ok(obj::write(&self.objects(py)?))
     }
 
     /// Its mesh as the bytes of a binary glTF file.
     fn glb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        Ok(PyBytes::new(py, &glb::write(&self.meshed(py)?)))
+        Ok(PyBytes::new(py, &glb::write(&self.objects(py)?)))
     }
 
     /// Its named points: x, y and z, by name.

@@ -35,6 +35,72 @@ fn what_was_found_is_the_first_line() {
     assert!((0.5..=1.0).contains(&sure) && (0.55..=1.0).contains(&fit), "{sure} {fit}");
 }
 
+/// The pixels of compressed run lengths, row by row.
+fn pixels(segmentation: &Value) -> Vec<bool> {
+    let [height, width] = [0, 1].map(|i| segmentation["size"][i].as_u64().unwrap() as usize);
+    let (mut runs, mut columns): (Vec<i64>, Vec<bool>) = (Vec::new(), Vec::new());
+    let mut bytes = segmentation["counts"].as_str().unwrap().bytes().map(|b| i64::from(b) - 48);
+    while let Some(mut group) = bytes.next() {
+        let (mut run, mut bits) = (group & 31, 5);
+        while group & 32 != 0 {
+            group = bytes.next().unwrap();
+            run |= (group & 31) << bits;
+            bits += 5;
+        }
+        if group & 16 != 0 {
+            run -= 1 << bits;
+        }
+        if runs.len() > 2 {
+            run += runs[runs.len() - 2];
+        }
+        columns.extend(std::iter::repeat_n(runs.len() % 2 == 1, run as usize));
+        runs.push(run);
+    }
+    assert_eq!(columns.len(), width * height);
+    (0..height)
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        .map(|(x, y)| columns[x * height + y])
+        .collect()
+}
+
+#[test]
+fn a_body_is_left_to_other_programs() {
+    let f = Folder::new("people_left");
+    std::fs::copy(SKIER, f.path().join("skier.jpg")).unwrap();
+    let run = ["run", "human.pcad", "--observe", "skier.jpg", "--out", "o", "--image-id", "7"];
+    f.succeeds(&[&run[..], &["--steps", "2", "--warmup", "2", "--chains", "1"]].concat());
+    let (joints, mask) = (json(&f, "o/keypoints.coco.json"), json(&f, "o/mask.coco.json"));
+    assert_eq!((&joints[0]["image_id"], &mask[0]["image_id"]), (&Value::from(7), &Value::from(7)));
+    assert_eq!(joints[0]["segmentation"], mask[0]["segmentation"]);
+    let picture = image::open(f.path().join("o/mask.png")).unwrap().to_luma8();
+    let covered: Vec<bool> = picture.pixels().map(|p| p[0] > 0).collect();
+    assert!(covered.contains(&true) && pixels(&mask[0]["segmentation"]) == covered);
+    // In metres: a person is as tall as one.
+    let metre = json(&f, "o/run.json")["metre"].as_f64().unwrap();
+    let text = f.read("o/best.obj");
+    let points = || text.lines().filter_map(|l| l.strip_prefix("v "));
+    let number = |word: Option<&str>| word.unwrap().parse::<f64>().unwrap();
+    let range = |axis: usize| {
+        let all = points().map(|p| number(p.split(' ').nth(axis)));
+        all.fold([f64::MAX, f64::MIN], |[low, high], x| [low.min(x), high.max(x)])
+    };
+    let longest = (0..3).map(range).map(|[low, high]| high - low).fold(0.0, f64::max);
+    assert!((0.7..2.2).contains(&longest) && metre > 0.1, "{longest} {metre}");
+    assert!(text.starts_with("o object\n") && text.contains("\ng thigh_l\n"));
+    // Joints, in the same unit and place.
+    let pose = json(&f, "o/pose.json");
+    let body = &pose["bodies"][0];
+    assert_eq!((&pose["unit"], body["joints"].as_array().unwrap().len()), (&"metre".into(), 22));
+    let root = body["joints"][0]["head"].as_array().unwrap();
+    assert!((0..3).all(|axis| {
+        let ([low, high], at) = (range(axis), root[axis].as_f64().unwrap());
+        (low..high).contains(&at)
+    }));
+    let landmarks = body["pose_world_landmarks"].as_array().unwrap();
+    assert_eq!((landmarks.len(), body["smpl"]["pose"].as_array().unwrap().len()), (33, 24));
+    assert!(f.read("o/pose.bvh").starts_with("HIERARCHY\nROOT pelvis\n"));
+}
+
 #[test]
 fn a_photograph_without_people_gets_no_body() {
     let f = Folder::new("people_none");

@@ -122,14 +122,18 @@ fn faces(m: &Mesh) -> Vec<[u32; 9]> {
 #[test]
 fn what_is_written_here_reads_back() {
     for m in [cuboid(DVec3::new(1.0, 2.0, 3.0)).unwrap(), sphere(0.7, 6).unwrap()] {
-        let loaded = read(&glb_file::write(&m)).unwrap();
-        assert_eq!((&loaded.names[..], loaded.rig.is_none()), (&["mesh_0".to_owned()][..], true));
+        let loaded = read(&glb_file::write(&[m.clone().into()])).unwrap();
+        assert_eq!((&loaded.names[..], loaded.rig.is_none()), (&["object".to_owned()][..], true));
         assert_eq!(faces(&loaded.mesh().unwrap()), faces(&m));
     }
     let m = sphere(0.5, 5).unwrap();
     let frame = FileFrame::new(UpAxis::Z, 0.5).unwrap();
-    let by_gltf = load(&glb_file::write(&m), &frame, &none).unwrap().mesh().unwrap();
-    assert_eq!(faces(&by_gltf), faces(&obj::load_in(obj::write(&m).as_bytes(), &frame).unwrap()));
+    let by_gltf =
+        load(&glb_file::write(&[m.clone().into()]), &frame, &none).unwrap().mesh().unwrap();
+    assert_eq!(
+        faces(&by_gltf),
+        faces(&obj::load_in(obj::write(&[m.into()]).as_bytes(), &frame).unwrap())
+    );
 }
 
 /// Returns a square in the plane z = 0, as a primitive of the given mode.
@@ -369,7 +373,10 @@ fn programs_read_them_with_options() {
     let to_z = DMat3::from_cols(DVec3::X, DVec3::Z, -DVec3::Y) * 100.0;
     file("body.glb", &skinned(&body, to_z, &json!({})));
     file("box.glb", &glb_file::write(&cuboid(DVec3::new(100.0, 200.0, 300.0)).unwrap()));
-    file("other.obj", obj::write(&cuboid(DVec3::new(100.0, 200.0, 500.0)).unwrap()).as_bytes());
+    file(
+        "other.obj",
+        obj::write(&[cuboid(DVec3::new(100.0, 200.0, 500.0)).unwrap().into()]).as_bytes(),
+    );
     let head = body.rig().joints()[body.rig().find("hand_l").unwrap()].head;
     let text = r#"include "std/scene.pcad" as scene;
         data body = armature("body.glb", up = "z", unit = 0.01);

@@ -27,6 +27,9 @@ pub struct Detect {
     /// The layout of people
     #[arg(long, value_enum, default_value_t = PeopleFormat::Coco)]
     pub format: PeopleFormat,
+    /// The number of the picture in a dataset of COCO's layout
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub image_id: u64,
     /// Draw what was detected over the photograph, to this file
     #[arg(long, value_name = "PNG")]
     pub overlay: Option<PathBuf>,
@@ -125,7 +128,7 @@ fn detect_people(a: &Detect, photo: &Photo) -> Result<(), Failure> {
         .map_err(|e| plain(e.to_string()))?;
     let size = (photo.width(), photo.height());
     let file = match a.format {
-        PeopleFormat::Coco => json::coco(&people, size, &name(a)),
+        PeopleFormat::Coco => json::coco(&people, size, &name(a), a.image_id),
         PeopleFormat::Mediapipe => json::mediapipe(&people, size),
     };
     write(a, "people.json", &format!("{file:#}\n"), || overlay(photo, &people))?;
@@ -142,7 +145,7 @@ fn detect_objects(a: &Detect, photo: &Photo) -> Result<(), Failure> {
     let found = finder
         .find(photo, View::WHOLE, &ObjectOptions::default())
         .map_err(|e| plain(e.to_string()))?;
-    let file = objects::json::coco(&found, (photo.width(), photo.height()), &name(a));
+    let file = objects::json::coco(&found, (photo.width(), photo.height()), &name(a), a.image_id);
     write(a, "objects.json", &format!("{file:#}\n"), || boxes(photo, &found))?;
     match found.len() {
         0 => print_line!("no objects were found"),

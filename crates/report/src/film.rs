@@ -14,33 +14,34 @@ pub struct FilmFrame {
 }
 
 /// Returns a film as an animated PNG file that plays again and again. Of each picture only
-/// what differs from the one before is stored; a program that cannot play it shows the
-/// first picture.
+/// what differs from the one before is stored. A program that does not play it shows `still`,
+/// which is no part of the film.
 ///
 /// # Errors
 /// If there are no pictures, or they differ in size.
-pub fn apng(frames: &[FilmFrame]) -> Result<Vec<u8>, String> {
+pub fn apng(frames: &[FilmFrame], still: &RgbImage) -> Result<Vec<u8>, String> {
     let first = frames.first().ok_or("a film needs at least one picture")?;
     let (width, height) = first.picture.dimensions();
-    if frames.iter().any(|f| f.picture.dimensions() != (width, height)) {
+    let pictures = frames.iter().map(|f| &f.picture).chain([still]);
+    if pictures.into_iter().any(|p| p.dimensions() != (width, height)) {
         return Err("the pictures of a film have one size".to_owned());
     }
     let mut bytes = Vec::new();
-    encode(&mut bytes, frames, (width, height)).map_err(|e| e.to_string())?;
+    encode(&mut bytes, frames, still).map_err(|e| e.to_string())?;
     Ok(bytes)
 }
 
-fn encode(
-    out: &mut Vec<u8>,
-    frames: &[FilmFrame],
-    (width, height): (u32, u32),
-) -> Result<(), EncodingError> {
+fn encode(out: &mut Vec<u8>, frames: &[FilmFrame], still: &RgbImage) -> Result<(), EncodingError> {
+    let (width, height) = still.dimensions();
     let mut encoder = Encoder::new(out, width, height);
     encoder.set_color(ColorType::Rgba);
     encoder.set_depth(BitDepth::Eight);
     encoder.set_compression(png::Compression::High);
     encoder.set_animated(frames.len() as u32, 0)?;
+    encoder.set_sep_def_img(true)?;
     let mut writer = encoder.write_header()?;
+    let opaque = still.pixels().flat_map(|p| [p[0], p[1], p[2], 255]);
+    writer.write_image_data(&opaque.collect::<Vec<u8>>())?;
     let mut before: Option<&RgbImage> = None;
     for frame in frames {
         let (left, top, w, h) =
@@ -97,10 +98,18 @@ mod tests {
     #[test]
     fn every_picture_comes_back() {
         let frames = [frame(3), frame(8), frame(8), frame(30)];
-        let bytes = apng(&frames).unwrap();
+        let bytes = apng(&frames, &frame(20).picture).unwrap();
         let decoder = png::Decoder::new(std::io::Cursor::new(&bytes));
         let mut reader = decoder.read_info().unwrap();
         assert_eq!(reader.info().animation_control().unwrap().num_frames, 4);
+        let mut still = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut still).unwrap();
+        assert!(reader.info().frame_control().is_none());
+        let seen = RgbImage::from_fn(40, 30, |x, y| {
+            let at = 4 * (y * 40 + x) as usize;
+            Rgb([still[at], still[at + 1], still[at + 2]])
+        });
+        assert_eq!(seen, frame(20).picture);
         let mut shown = RgbImage::new(40, 30);
         for f in &frames {
             let mut buffer = vec![0; reader.output_buffer_size().unwrap()];
@@ -118,14 +127,15 @@ mod tests {
             }
             assert_eq!(shown, f.picture);
         }
-        let whole: usize = 4 * 40 * 30 * 4;
+        let whole: usize = 5 * 40 * 30 * 4;
         assert!(bytes.len() < whole / 4, "{} bytes", bytes.len());
     }
 
     #[test]
     fn films_without_pictures_or_of_two_sizes_are_errors() {
-        assert!(apng(&[]).is_err());
+        let still = frame(0).picture;
+        assert!(apng(&[], &still).is_err() && apng(&[frame(0)], &RgbImage::new(2, 2)).is_err());
         let other = FilmFrame { picture: RgbImage::new(2, 2), milliseconds: 1 };
-        assert!(apng(&[frame(0), other]).is_err());
+        assert!(apng(&[frame(0), other], &still).is_err());
     }
 }

@@ -14,7 +14,7 @@ pub const MARK: &str = "run.json";
 const CLEARED: &[u8] = b"{}";
 /// The files that a run writes besides `run.json`, numbered files, and the exports of its
 /// program.
-const WRITTEN: [&str; 24] = [
+const WRITTEN: [&str; 27] = [
     "program.pcad",
     "traces.jsonl",
     "trajectory.jsonl",
@@ -38,6 +38,9 @@ const WRITTEN: [&str; 24] = [
     "best.glb",
     "keypoints.json",
     "keypoints.coco.json",
+    "mask.coco.json",
+    "pose.json",
+    "pose.bvh",
     "report.html",
 ];
 
@@ -169,8 +172,13 @@ fn numbered(parent: &Path, name: &str, n: u32) -> PathBuf {
 /// Returns whether a file holds draws of a chain, its checkpoint, or the picture of a
 /// mode.
 fn is_numbered(name: &str) -> bool {
-    let forms =
-        [("chain-", ".csv"), ("draws-", ".csv"), ("chain-", ".checkpoint"), ("mode-", ".png")];
+    let forms = [
+        ("chain-", ".csv"),
+        ("draws-", ".csv"),
+        ("chain-", ".checkpoint"),
+        ("mode-", ".png"),
+        ("pose-", ".bvh"),
+    ];
     let number =
         forms.iter().find_map(|(before, after)| name.strip_prefix(before)?.strip_suffix(after));
     number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))

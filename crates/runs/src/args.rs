@@ -120,6 +120,19 @@ impl Sampling {
     }
 }
 
+/// What the results for COCO's tools say of the picture.
+#[derive(Args, Clone, Debug, Default)]
+pub struct CocoArgs {
+    /// The picture's number in a dataset of COCO's layout, for keypoints.coco.json and
+    /// mask.coco.json [default: the number that the photograph's file is named by, or else
+    /// that name]
+    #[arg(long, value_name = "N")]
+    pub image_id: Option<u64>,
+    /// The number of the object's category, for mask.coco.json [default: 1]
+    #[arg(long, value_name = "N")]
+    pub category_id: Option<u64>,
+}
+
 /// One run: a program, what it observes, how it is sampled.
 #[derive(Args, Clone, Debug)]
 pub struct Job {
@@ -147,6 +160,9 @@ pub struct Job {
     /// [default: at most 1600 pixels along the longer side]
     #[arg(long)]
     pub full_size: bool,
+    /// COCO's numbers
+    #[command(flatten)]
+    pub coco: CocoArgs,
     /// Seed, chains, steps, time
     #[command(flatten)]
     pub sampling: Sampling,
@@ -162,6 +178,7 @@ impl Job {
             keypoints: None,
             features_from: None,
             full_size: false,
+            coco: CocoArgs::default(),
             sampling,
         }
     }
@@ -277,8 +294,8 @@ pub struct Film {
     /// The folder of the run
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
-    /// The file to write: an animated picture (.png), or meshes with their animation (.glb;
-    /// a body keeps its skin). A name without an ending is a folder for one PNG file per
+    /// The file to write: an animated picture (.png), or meshes with their animation (.glb). A
+    /// program that does not play it shows the best state. A name without an ending is a folder for one PNG file per
     /// picture
     #[arg(short, value_name = "FILE|DIR", default_value = "film.png")]
     pub out: PathBuf,

@@ -8,6 +8,7 @@ use crate::failure::{Failure, plain};
 use crate::files::write_in;
 use crate::inputs::Ready;
 use crate::people;
+use crate::pose::write_poses;
 use crate::progress::Ending;
 use crate::reopening::seen::show_seen;
 use crate::scene;
@@ -22,7 +23,7 @@ use pcadlang_library::Model;
 use pcadlang_library::scene::{ImageValue, ViewValue};
 use pcadlang_report::RunDir;
 use pcadlang_report::pictures::{self, png};
-use pcadlang_scene::geom::{Mesh, Solid, glb, obj};
+use pcadlang_scene::geom::{Object, Solid, glb, obj};
 use pcadlang_scene::render::{Camera, Frame, View};
 use pcadlang_scene::vision::{Mask, Photo, npy};
 use pcadlang_workbench::session::{detected, exported, exported_operand, over};
@@ -45,6 +46,8 @@ pub struct Shown {
     pub size: Option<[u32; 2]>,
     /// The fraction of the mesh's vertices that are in the picture.
     pub inside: Option<f64>,
+    /// The length of a metre in scene units, if the program knows it.
+    pub metre: Option<f64>,
     /// How far the chains' last states cover the same pixels: the number of pixels that
     /// all of them cover, divided by that of pixels that any of them covers.
     pub agreement: Option<f64>,
@@ -134,24 +137,25 @@ fn draw(
     let (spread, agreement) = frequency(chains.iter().map(|c| c.last.clone()), seed);
     shown.agreement = agreement;
     write_in(dir, "uncertainty.png", &encode(png(&spread))?)?;
-    if let Some(mesh) = mesh(view.solid()) {
-        write_in(dir, "best.obj", obj::write(&mesh).as_bytes())?;
-        write_in(dir, "best.glb", &glb::write(&mesh))?;
-        shown.inside = inside(&mesh, camera);
+    if let Some(objects) = objects(&view.solid_in_files()) {
+        write_in(dir, "best.obj", obj::write(&objects).as_bytes())?;
+        write_in(dir, "best.glb", &glb::write(&objects))?;
     }
-    Ok(())
+    shown.inside = inside(view.solid(), camera);
+    shown.metre = view.metre();
+    write_poses(dir, view)
 }
 
-/// Returns the fraction of a mesh's vertices that are in the picture and in front of the
+/// Returns the fraction of a solid's vertices that are in the picture and in front of the
 /// camera.
-fn inside(mesh: &Mesh, camera: &Camera) -> Option<f64> {
-    let within = |p: &glam::Vec3| {
-        let (x, y, depth) = camera.project(p.as_dvec3());
+fn inside(solid: &Solid, camera: &Camera) -> Option<f64> {
+    let within = |p: &glam::DVec3| {
+        let (x, y, depth) = camera.project(*p);
         let on = |v: f64, size: u32| (0.0..=f64::from(size)).contains(&v);
         depth > 0.0 && on(x, camera.width) && on(y, camera.height)
     };
-    let all = mesh.positions.len();
-    (all > 0).then(|| mesh.positions.iter().filter(|p| within(p)).count() as f64 / all as f64)
+    let all = solid.vertex_count();
+    (all > 0).then(|| solid.vertices().filter(within).count() as f64 / all as f64)
 }
 
 /// Warns if less than half of the scene is in the picture.
@@ -164,11 +168,11 @@ pub fn outside(shown: &Shown) -> Option<String> {
     ))
 }
 
-/// Returns the mesh of a solid. A solid too far away or too small for single precision
+/// Returns the objects of a solid. A solid too far away or too small for single precision
 /// has none, which must not fail the run.
-fn mesh(solid: &Solid) -> Option<Mesh> {
-    match solid.to_mesh() {
-        Ok(mesh) => Some(mesh),
+fn objects(solid: &Solid) -> Option<Vec<Object>> {
+    match solid.objects() {
+        Ok(objects) => Some(objects),
         Err(e) => {
             error_line!("warning: cannot write the mesh: {e}");
             None
@@ -192,6 +196,15 @@ fn bounded((width, height): (u32, u32), most: u32) -> (u32, u32) {
 /// Returns the pixels that the object covers.
 fn covered(frame: &Frame) -> Option<Mask> {
     Mask::new(frame.width, frame.height, frame.mask().collect()).ok()
+}
+
+/// Returns the pixels that a view covers, at the size of the photograph, if any.
+pub fn whole_mask(view: &View, size: Option<(u32, u32)>) -> Option<Mask> {
+    let (width, height) = size.unwrap_or((view.camera().width, view.camera().height));
+    let frame = view.depth(width.max(height));
+    let mask = covered(&frame)?;
+    let same = (frame.width, frame.height) == (width, height);
+    Some(if same { mask } else { mask.resized(width, height) })
 }
 
 /// Judges a run under way by its best state and, for the chains' last states, the latest

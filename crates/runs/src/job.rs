@@ -5,13 +5,15 @@
 //! complete.
 
 use crate::args::{Job, Live};
-use crate::best::{disagreement, keep_best, outside, show_best, structure_warning, stuck_warning};
+use crate::best::{
+    disagreement, keep_best, outside, show_best, structure_warning, stuck_warning, whole_mask,
+};
 use crate::embedded::write_scene;
 use crate::failure::{Failure, plain};
 use crate::files::write_in;
 use crate::inputs;
 use crate::inputs::Ready;
-use crate::keypoints::{Joints, coco};
+use crate::keypoints::{Joints, coco, coco_mask, image_id};
 use crate::people;
 use crate::places::{best_of_each, show_places};
 pub use crate::progress::Interrupt;
@@ -349,6 +351,16 @@ impl Fill<'_> {
         }
         warnings.extend(outside(&drawn));
         let seconds = ready.begun.elapsed().as_secs_f64();
+        let picture = job.observe.first().map_or("", |o| stem(inputs::file_of(o)));
+        let image = image_id(job.coco.image_id, picture);
+        // Without a photograph there is nothing that the results could be of.
+        let of_picture = ready.size().is_some() || job.coco.image_id.is_some();
+        let view = drawn.view.as_ref().filter(|_| of_picture);
+        let whole = view.and_then(|v| whole_mask(&v.0, ready.size()));
+        if let Some(mask) = &whole {
+            let category = job.coco.category_id.unwrap_or(1);
+            write_json(dir, "mask.coco.json", &coco_mask(mask, &image, category))?;
+        }
         if let Some(found) =
             drawn.view.as_ref().and_then(|v| self.joints.report(v, &modes, seconds))
         {
@@ -357,13 +369,13 @@ impl Fill<'_> {
                 said["found"] = judged.json();
             }
             write_json(dir, KEYPOINTS, &said)?;
-            let picture = job.observe.first().map_or("", |o| stem(inputs::file_of(o)));
-            if let Some(coco) = coco(&found, picture) {
+            if let Some(coco) = coco(&found, &image, whole.as_ref()) {
                 write_in(dir, "keypoints.coco.json", coco.to_string().as_bytes())?;
             }
         }
         let mut more = counts(&chains, best.as_deref(), &quantities);
         more.extend(drawn.size.map(|size| ("size".into(), json!(size))));
+        more.extend(drawn.metre.map(|metre| ("metre".into(), json!(metre))));
         more.extend(drawn.agreement.map(|a| ("agreement".into(), json!(a))));
         more.extend(judged.as_ref().map(|j| ("found".into(), j.json())));
         let outcome = Outcome {

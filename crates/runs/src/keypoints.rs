@@ -8,6 +8,7 @@ use pcadlang_engine::trace::{Draws, Trace};
 use pcadlang_inference::{Callback, StateError};
 use pcadlang_library::scene::ViewValue;
 use pcadlang_report::{Mode, Moments};
+use pcadlang_scene::vision::Mask;
 use pcadlang_scene::vision::keypoints::COCO;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -133,10 +134,19 @@ impl Joints {
     }
 }
 
+/// Returns the number of a picture in results for COCO's tools: what the user says, or the
+/// number that its file is named by, as COCO's are, or else that name.
+pub fn image_id(given: Option<u64>, picture: &str) -> Value {
+    let number = given.or_else(|| picture.parse().ok());
+    number.map_or_else(|| json!(picture), |n| json!(n))
+}
+
 /// Returns the joints of [`Joints::report`] in the format of results of the COCO keypoint
-/// challenge: one person in the picture of this name. A joint that is not there has
-/// visibility 0, any other 2. `None` if there are none of COCO's joints.
-pub fn coco(found: &Value, picture: &str) -> Option<Value> {
+/// challenge: one person in the picture of this number. A joint that is not there has
+/// visibility 0, any other 2. The mask, if there is one, is the body's; without it, readers
+/// take the area from the joints, in which those at 0, 0 count. `None` if there are none of
+/// COCO's joints.
+pub fn coco(found: &Value, image: &Value, mask: Option<&Mask>) -> Option<Value> {
     let joint = |name: &&str| {
         let at = &found["keypoints"][name];
         let known = at[0].is_number() && at[1].is_number();
@@ -147,9 +157,26 @@ pub fn coco(found: &Value, picture: &str) -> Option<Value> {
         return None;
     }
     let numbers: Vec<&Value> = joints.iter().filter_map(Value::as_array).flatten().collect();
-    // COCO numbers its pictures; their files are called by that number.
-    let image = picture.parse::<u64>().map_or_else(|_| json!(picture), |n| json!(n));
-    Some(json!([{ "image_id": image, "category_id": 1, "keypoints": numbers, "score": 1 }]))
+    let mut person =
+        json!({ "image_id": image, "category_id": 1, "keypoints": numbers, "score": 1 });
+    if let Some(mask) = mask {
+        person["segmentation"] = segmentation(mask);
+    }
+    Some(json!([person]))
+}
+
+/// Returns a mask as the results of COCO's segmentation challenge. They have no box: a reader
+/// that finds one takes the area from it.
+pub fn coco_mask(mask: &Mask, image: &Value, category: u64) -> Value {
+    let segmentation = segmentation(mask);
+    let result = json!({
+        "image_id": image, "category_id": category, "segmentation": segmentation, "score": 1,
+    });
+    json!([result])
+}
+
+fn segmentation(mask: &Mask) -> Value {
+    json!({ "size": [mask.height(), mask.width()], "counts": mask.coco_counts() })
 }
 
 /// Rounds a number of pixels or seconds to a thousandth.
@@ -220,7 +247,8 @@ mod tests {
     #[test]
     fn joints_are_in_the_order_of_coco() {
         let found = json!({ "keypoints": { "nose": [3.5, 4, 1], "r_ankle": [7, 8, 1], "pelvis": [1, 1, 1] } });
-        let all = coco(&found, "000000442619").unwrap();
+        let picture = |name: &str| image_id(None, name);
+        let all = coco(&found, &picture("000000442619"), None).unwrap();
         assert_eq!((&all[0]["image_id"], &all[0]["category_id"]), (&json!(442_619), &json!(1)));
         let numbers = all[0]["keypoints"].as_array().unwrap();
         assert_eq!(numbers.len(), 51);
@@ -229,7 +257,22 @@ mod tests {
             (&[json!(3.5), json!(4), json!(2)][..], &[json!(7), json!(8), json!(2)][..])
         );
         assert!(numbers[3..48].iter().all(|n| *n == 0));
-        assert_eq!(coco(&found, "skier").unwrap()[0]["image_id"], "skier");
-        assert!(coco(&json!({ "keypoints": { "pelvis": [1, 1, 1] } }), "a").is_none());
+        assert_eq!(coco(&found, &picture("skier"), None).unwrap()[0]["image_id"], "skier");
+        let none = json!({ "keypoints": { "pelvis": [1, 1, 1] } });
+        assert!(coco(&none, &picture("a"), None).is_none());
+        assert_eq!(image_id(Some(7), "000000442619"), 7);
+    }
+
+    #[test]
+    fn masks_are_as_coco_has_them() {
+        // pycocotools 2.0.11 encodes it so.
+        let rows = [1, 1, 0, 1, 0, 0, 1, 0, 1, 0, 1, 1].map(|x| x == 1).to_vec();
+        let mask = Mask::new(4, 3, rows).unwrap();
+        let runs = json!({ "size": [3, 4], "counts": "011121NN" });
+        let one = json!({ "image_id": 5, "category_id": 62, "segmentation": runs, "score": 1 });
+        assert_eq!(coco_mask(&mask, &json!(5), 62), json!([one]));
+        let found = json!({ "keypoints": { "nose": [3.5, 4, 1] } });
+        let person = coco(&found, &json!(5), Some(&mask)).unwrap();
+        assert_eq!((&person[0]["segmentation"], person[0].get("bbox")), (&runs, None));
     }
 }

@@ -18,6 +18,7 @@ pub mod keypoints;
 pub mod live;
 pub mod people;
 pub mod places;
+pub mod pose;
 pub mod progress;
 pub mod quality;
 pub mod record;

@@ -68,8 +68,8 @@ impl Live {
                 "image/png",
                 &png(&picture).map_err(|e| plain(e.to_string()))?,
             )?;
-            if let Ok(mesh) = view.solid().to_mesh() {
-                self.send("best.glb", "model/gltf-binary", &glb::write(&mesh))?;
+            if let Ok(objects) = view.solid_in_files().objects() {
+                self.send("best.glb", "model/gltf-binary", &glb::write(&objects))?;
             }
         }
         let state = json!({

@@ -58,6 +58,7 @@ fn job(a: &Check, path: &str) -> Job {
     Job {
         features_from: None,
         full_size: false,
+        coco: Default::default(),
         inputs: Inputs {
             program: path.to_owned(),
             sets: a.sets.clone(),

@@ -76,6 +76,7 @@ fn job(a: &Repl, path: &str) -> Job {
             hint: Default::default(),
         },
         full_size: false,
+        coco: Default::default(),
         observe: a.observe.clone(),
         observe_contours: None,
         keypoints: a.keypoints.clone(),

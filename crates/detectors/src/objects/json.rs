@@ -3,14 +3,19 @@
 use super::{CLASSES, FoundObject};
 use serde_json::{Value, json};
 
-/// Returns the objects in a picture of this size and name as COCO annotations: box, COCO's
-/// number of the class, and score.
-pub fn coco(objects: &[FoundObject], (width, height): (u32, u32), name: &str) -> Value {
+/// Returns the objects in a picture of this size, name and number as COCO annotations: box,
+/// COCO's number of the class, and score.
+pub fn coco(
+    objects: &[FoundObject],
+    (width, height): (u32, u32),
+    name: &str,
+    image_id: u64,
+) -> Value {
     let annotation = |(i, o): (usize, &FoundObject)| {
         let [left, top, right, bottom] = o.bounds;
         let sides = [left, top, right - left, bottom - top].map(number);
         json!({
-            "id": i + 1, "image_id": 1, "category_id": CLASSES[o.class].1, "bbox": sides,
+            "id": i + 1, "image_id": image_id, "category_id": CLASSES[o.class].1, "bbox": sides,
             "area": number((right - left) * (bottom - top)), "iscrowd": 0, "score": number(o.score),
         })
     };
@@ -18,7 +23,7 @@ pub fn coco(objects: &[FoundObject], (width, height): (u32, u32), name: &str) ->
     let categories: Vec<Value> =
         CLASSES.iter().map(|(name, id)| json!({ "id": id, "name": name })).collect();
     json!({
-        "images": [{ "id": 1, "file_name": name, "width": width, "height": height }],
+        "images": [{ "id": image_id, "file_name": name, "width": width, "height": height }],
         "categories": categories,
         "annotations": annotations,
     })

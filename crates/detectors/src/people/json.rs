@@ -5,16 +5,16 @@ use super::{Landmark, Person};
 use pcadlang_scene::vision::keypoints::{COCO, MEDIAPIPE};
 use serde_json::{Map, Value, json};
 
-/// Returns the people in a picture of this size and name as COCO annotations: 17 joints
+/// Returns the people in a picture of this size, name and number as COCO annotations: 17 joints
 /// with the visibility as third number, box and score. In addition, `landmarks` has all
 /// 33 by name (x, y, visibility, standard deviation in pixels), and `metres` their
 /// positions relative to the hips.
-pub fn coco(people: &[Person], (width, height): (u32, u32), name: &str) -> Value {
+pub fn coco(people: &[Person], (width, height): (u32, u32), name: &str, image_id: u64) -> Value {
     let annotation = |(i, p): (usize, &Person)| {
         let [left, top, right, bottom] = p.bounds;
         let joints: Vec<Value> = COCO.iter().flat_map(|name| triple(p.landmark(name))).collect();
         json!({
-            "id": i + 1, "image_id": 1, "category_id": 1, "score": number(p.score), "num_keypoints": COCO.len(),
+            "id": i + 1, "image_id": image_id, "category_id": 1, "score": number(p.score), "num_keypoints": COCO.len(),
             "bbox": [number(left), number(top), number(right - left), number(bottom - top)],
             "keypoints": joints,
             "landmarks": by_name(p, |l| json!([number(l.at[0]), number(l.at[1]), number(l.visibility), number(l.spread)])),
@@ -24,7 +24,7 @@ pub fn coco(people: &[Person], (width, height): (u32, u32), name: &str) -> Value
     };
     let annotations: Vec<Value> = people.iter().enumerate().map(annotation).collect();
     json!({
-        "images": [{ "id": 1, "file_name": name, "width": width, "height": height }],
+        "images": [{ "id": image_id, "file_name": name, "width": width, "height": height }],
         "categories": [{ "id": 1, "name": "person", "keypoints": COCO }],
         "annotations": annotations,
     })

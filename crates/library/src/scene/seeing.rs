@@ -51,12 +51,24 @@ pub(super) const TABLE: &[Row] = &[
         &[
             arg("solid", SOLID, "The solid to view."),
             opt("camera", CAMERA, "the run's", "The camera; by default, that of the run."),
+            opt(
+                "metre",
+                Type::Num,
+                "none",
+                "The length of a metre, such as the scale of a body. Files of the scene are then in metres.",
+            )
+            .positive()
+            .unit("scene units"),
         ],
         VIEW,
         "A solid seen by a camera. It is rendered only when a likelihood or report needs it.",
         |a, previous| {
             let solid = a.object::<SolidValue>(0, "a solid")?;
             let view = View::new(solid.0.clone(), camera(a, (256, 256))?);
+            let view = match a.given("metre") {
+                true => view.in_metres(a.num("metre")?),
+                false => view,
+            };
             let view = match previous.and_then(|p| p.value.downcast::<ViewValue>()) {
                 Some(previous) => view.after(&previous.0),
                 None => view,
@@ -65,7 +77,8 @@ pub(super) const TABLE: &[Row] = &[
             Ok((Value::object(ViewValue(Arc::new(view))), Arc::new(())))
         },
     )
-    .vjp(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown])),
+    // The picture does not depend on the unit of files.
+    .vjp(|_, _, by| Some(smallvec![by.clone(), Adjoint::Unknown, Adjoint::Zero])),
     native(
         "bounds",
         SECTION,

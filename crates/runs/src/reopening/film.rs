@@ -45,7 +45,10 @@ pub fn write(a: &Film) -> Result<(), Failure> {
         Some("glb") => files::write(&a.out, &animation(&run, &ready, &states)?)?,
         Some("png") => {
             let frames = frames(&run, &ready, &states, a)?;
-            files::write(&a.out, &apng(&frames).map_err(plain)?)?;
+            // What does not play shows the best state, which is the last of the way.
+            let best = states.len().checked_sub(1).and_then(|last| frames.get(last));
+            let still = best.ok_or_else(|| plain("the run kept no states"))?;
+            files::write(&a.out, &apng(&frames, &still.picture).map_err(plain)?)?;
         }
         None => {
             std::fs::create_dir_all(&a.out)
@@ -97,7 +100,7 @@ fn view_of(run: &Reopened, ready: &Ready, saved: &SavedTrace) -> Result<Arc<View
 /// Returns the states as an animation of meshes.
 fn animation(run: &Reopened, ready: &Ready, states: &[SavedTrace]) -> Result<Vec<u8>, Failure> {
     let solids: Result<Vec<Solid>, Failure> =
-        states.iter().map(|s| Ok(view_of(run, ready, s)?.solid().clone())).collect();
+        states.iter().map(|s| Ok(view_of(run, ready, s)?.solid_in_files())).collect();
     glb::write_animation(&solids?, f64::from(STATE) / 1000.0)
         .map_err(|e| plain(format!("cannot make an animation: {e}")))
 }

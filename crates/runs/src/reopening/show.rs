@@ -59,15 +59,16 @@ pub fn show(a: &Show) -> Result<(), Failure> {
     let draws = scene::predictive(run.job.sampling.seed, 0);
     let view =
         scene::view(&mut trace, draws, None).ok_or_else(|| plain("the program has no view"))?;
-    let mesh = || view.solid().to_mesh().map_err(|e| plain(format!("cannot make a mesh: {e}")));
+    let failed = |e| plain(format!("cannot make a mesh: {e}"));
+    let objects = || view.solid_in_files().objects().map_err(failed);
     let bytes = match out.extension().and_then(|e| e.to_str()) {
         Some("png") => {
             let (camera, photo) = (view.camera(), ready.photo());
             let size = photo.map_or((camera.width, camera.height), |p| (p.width(), p.height()));
             png(&over(&view, photo.map(Photo::rgb), size)).map_err(|e| plain(e.to_string()))?
         }
-        Some("obj") => obj::write(&mesh()?).into_bytes(),
-        Some("glb") => glb::write(&mesh()?),
+        Some("obj") => obj::write(&objects()?).into_bytes(),
+        Some("glb") => glb::write(&objects()?),
         _ => {
             return Err(plain(format!(
                 "{}: the file name must end in .png, .obj or .glb",

@@ -9,7 +9,7 @@ use super::mesh::MOST_TRIANGLES;
 use super::profile_path::{OuterPath, Profile, Tolerance, Wall, floor_height, inner_wall};
 use super::real::{Real, Tape, Var};
 use super::revolve::{Strip, revolve, vjp_rings};
-use super::{Affine, GeomError, Instance, Mesh, Revolution, Solid};
+use super::{GeomError, Instance, Mesh, Revolution, Solid};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -91,10 +91,8 @@ impl Solid {
         let Layout { strips, closed } = layout(parts, caps, wall, |x| x)?;
         let count = parts.len() as u16 + 5;
         let surface = Revolution::new(&strips, closed, count);
-        Ok(Solid::turned(surface, move || Instance {
-            mesh: Arc::new(revolve(&strips, sides, closed, count)),
-            affine: Affine::IDENTITY,
-            first_part: 0,
+        Ok(Solid::turned(surface, move || {
+            Instance::new(Arc::new(revolve(&strips, sides, closed, count)))
         }))
     }
 }

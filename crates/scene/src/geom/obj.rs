@@ -6,7 +6,7 @@
 //! whose corners exist, so no input can cause a panic.
 
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
-use super::{FileFrame, GeomError, Mesh};
+use super::{FileFrame, GeomError, Mesh, Object};
 use glam::Vec3;
 use rustc_hash::FxHashMap;
 use std::fmt::Write;
@@ -224,26 +224,43 @@ fn face<'a>(words: impl Iterator<Item = &'a str>, vertices: i64) -> Result<Vec<i
     }
 }
 
-/// Returns the text of an OBJ file with positions, normals and one group for each part.
-pub fn write(mesh: &Mesh) -> String {
-    let mut s =
-        String::with_capacity(mesh.positions.len() * 64 + mesh.topology.triangles.len() * 32);
-    for p in &mesh.positions {
-        let _ = writeln!(s, "v {} {} {}", p.x, p.y, p.z);
-    }
-    for n in &mesh.normals {
-        let _ = writeln!(s, "vn {} {} {}", n.x, n.y, n.z);
-    }
-    let mut group = None;
-    for (t, part) in mesh.topology.triangles.iter().zip(&mesh.topology.parts) {
-        if group != Some(part) {
-            let _ = writeln!(s, "g part{part}");
-            group = Some(part);
+/// Returns the text of an OBJ file with positions and normals: an object for each of these, and
+/// in it a group for each of its parts, if there are several.
+pub fn write(objects: &[Object]) -> String {
+    let mut s = String::new();
+    let mut first = 1;
+    for Object { name, mesh } in objects {
+        let t = &mesh.topology;
+        s.reserve(mesh.positions.len() * 64 + t.triangles.len() * 32);
+        let _ = writeln!(s, "o {}", on_one_line(name));
+        for p in &mesh.positions {
+            let _ = writeln!(s, "v {} {} {}", p.x, p.y, p.z);
         }
-        let [a, b, c] = t.map(|v| v + 1);
-        let _ = writeln!(s, "f {a}//{a} {b}//{b} {c}//{c}");
+        for n in &mesh.normals {
+            let _ = writeln!(s, "vn {} {} {}", n.x, n.y, n.z);
+        }
+        let one = t.parts.iter().all(|p| Some(p) == t.parts.first());
+        let mut group = if one { t.parts.first().copied() } else { None };
+        for (triangle, part) in t.triangles.iter().zip(&t.parts) {
+            if group != Some(*part) {
+                let _ = match t.part_names.get(usize::from(*part)).filter(|n| !n.is_empty()) {
+                    Some(own) => writeln!(s, "g {}", on_one_line(own)),
+                    None => writeln!(s, "g {}_part{part}", on_one_line(name)),
+                };
+                group = Some(*part);
+            }
+            let [a, b, c] = triangle.map(|v| v as usize + first);
+            let _ = writeln!(s, "f {a}//{a} {b}//{b} {c}//{c}");
+        }
+        first += mesh.positions.len();
     }
     s
+}
+
+/// A name without ends of lines, and without what begins a comment or continues a line.
+fn on_one_line(name: &str) -> String {
+    let apart = |c: char| if c.is_control() || matches!(c, '#' | '\\') { '_' } else { c };
+    name.trim().chars().map(apart).collect()
 }
 
 #[cfg(test)]
@@ -255,12 +272,12 @@ mod tests {
     fn what_is_written_reads_back() {
         let profile = Profile { y: vec![0.0, 1.0, 2.0], r: vec![0.5, 0.7, 0.3] };
         let m = lathe(&[profile], 12, 0.1, Caps::Both).unwrap();
-        let back = load(write(&m).as_bytes()).unwrap();
+        let back = load(write(&[m.clone().into()]).as_bytes()).unwrap();
         assert_eq!(back.topology.triangles.len(), m.topology.triangles.len());
         assert_eq!(back.bounds(), m.bounds());
         let b = cuboid(glam::DVec3::ONE).unwrap();
         assert_eq!(
-            load(write(&b).as_bytes()).unwrap().topology.edges.len(),
+            load(write(&[b.clone().into()]).as_bytes()).unwrap().topology.edges.len(),
             b.topology.edges.len()
         );
     }
@@ -357,7 +374,7 @@ mod tests {
             Profile { y: vec![1.0, 2.0], r: vec![0.3, 0.0] },
         ];
         let m = lathe(&stack, 9, 0.0, Caps::Both).unwrap();
-        let back = load(write(&m).as_bytes()).unwrap();
+        let back = load(write(&[m.clone().into()]).as_bytes()).unwrap();
         let corners = |m: &Mesh| {
             m.topology
                 .triangles
@@ -384,7 +401,8 @@ mod tests {
         };
         assert_eq!(sorted(&back), sorted(&m), "single precision survives the text");
         assert_eq!(faces_of(&back), faces_of(&m));
-        assert_eq!(write(&load(write(&back).as_bytes()).unwrap()), write(&back));
+        let text = |m: Mesh| write(&[m.into()]);
+        assert_eq!(text(load(text(back.clone()).as_bytes()).unwrap()), text(back));
     }
 
     proptest::proptest! {

@@ -5,6 +5,7 @@
 //! Invariants: a member's parts are numbered after those of the members before it
 //! (numbers beyond 65534 are all drawn as that one); all landmarks have different names.
 
+use super::armature::PosedBody;
 use super::landmark::{Landmark, unique};
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use super::revolution::Revolution;
@@ -23,6 +24,17 @@ pub struct Instance {
     pub affine: Affine,
     /// The offset added to its part numbers.
     pub first_part: u16,
+    /// The number of the object that it belongs to, as a file of the solid has them.
+    pub object: u16,
+    /// That object's name, if it has one.
+    pub name: Option<Arc<str>>,
+}
+
+impl Instance {
+    /// A mesh placed by the identity: an object without a name.
+    pub fn new(mesh: Arc<Mesh>) -> Instance {
+        Instance { mesh, affine: Affine::IDENTITY, first_part: 0, object: 0, name: None }
+    }
 }
 
 /// A list that is computed on first use.
@@ -41,6 +53,8 @@ pub struct Solid {
     revolution: Option<PlacedRevolution>,
     /// The transforms of the joints of a body in a pose.
     joints: Option<Arc<[DAffine3]>>,
+    /// The bodies in it, as they are posed and placed.
+    bodies: Option<Arc<[PosedBody]>>,
 }
 
 /// A placed surface of revolution.
@@ -97,6 +111,11 @@ impl Meshes {
         let after = |i: &Instance| i.first_part.saturating_add(i.mesh.topology.part_count);
         self.iter().map(after).max().unwrap_or(0)
     }
+
+    /// The number of objects.
+    fn object_count(&self) -> u16 {
+        self.iter().map(|i| i.object.saturating_add(1)).max().unwrap_or(0)
+    }
 }
 
 impl Deref for Meshes {
@@ -148,7 +167,7 @@ fn ready<T: Send + Sync + 'static>(list: Arc<[T]>) -> Arc<Lazy<T>> {
 impl Solid {
     /// A solid of one mesh, placed by the identity.
     pub fn new(mesh: Arc<Mesh>) -> Solid {
-        Solid::of(Arc::new([Instance { mesh, affine: Affine::IDENTITY, first_part: 0 }]))
+        Solid::of(Arc::new([Instance::new(mesh)]))
     }
 
     /// A solid of placed meshes, without landmarks.
@@ -160,6 +179,7 @@ impl Solid {
             lazy_depth: 0,
             revolution: None,
             joints: None,
+            bodies: None,
         }
     }
 
@@ -210,9 +230,14 @@ impl Solid {
         &self.landmarks
     }
 
-    /// Notes the transforms of the joints of the body that this is.
-    pub(super) fn with_joints(self, joints: Arc<[DAffine3]>) -> Solid {
-        Solid { joints: Some(joints), ..self }
+    /// Notes the body that this is.
+    pub(super) fn with_body(self, body: PosedBody) -> Solid {
+        Solid { joints: Some(Arc::clone(&body.joints)), bodies: Some(Arc::new([body])), ..self }
+    }
+
+    /// The bodies in it, as they are posed and placed.
+    pub fn bodies(&self) -> &[PosedBody] {
+        self.bodies.as_deref().unwrap_or_default()
     }
 
     /// The transforms of the joints, if this is a body in a pose that has not been placed.
@@ -227,8 +252,7 @@ impl Solid {
         M: IntoIterator<Item = Instance>,
     {
         let instances = Meshes(later(move || make().into_iter().collect()));
-        let landmarks = ready(Arc::default());
-        Solid { instances, group: None, landmarks, lazy_depth: 1, revolution: None, joints: None }
+        Solid { instances, lazy_depth: 1, ..Solid::of(Arc::default()) }
     }
 
     /// The placed meshes.
@@ -250,8 +274,10 @@ impl Solid {
             .revolution
             .as_ref()
             .map(|r| PlacedRevolution { surface: Arc::clone(&r.surface), affine: by * r.affine });
+        let moved = |b: &PosedBody| PosedBody { place: by * b.place, ..b.clone() };
+        let bodies = self.bodies.as_ref().map(|all| all.iter().map(moved).collect());
         let lazy_depth = self.lazy_depth + 1;
-        Solid { instances, group: None, landmarks, lazy_depth, revolution, joints: None }
+        Solid { instances, group: None, landmarks, lazy_depth, revolution, joints: None, bodies }
             .forced_if_deep()
     }
 
@@ -275,21 +301,32 @@ impl Solid {
         own.map(|i| 3 * i.mesh.positions.len() + 5 * i.mesh.topology.triangles.len()).sum()
     }
 
-    /// Groups solids. Their parts are numbered consecutively, and their landmarks are
-    /// concatenated.
+    /// Groups solids. Their parts and objects are numbered consecutively, and their landmarks
+    /// are concatenated.
     pub fn group(solids: &[Solid]) -> Solid {
+        Solid::named_group(solids, Vec::new())
+    }
+
+    /// As [`Solid::group`], with a name for each of the solids: that of its objects, before the
+    /// names that they have. Solids beyond the names have none.
+    pub fn named_group(solids: &[Solid], names: Vec<Arc<str>>) -> Solid {
         let lists: Box<[Meshes]> = solids.iter().map(|s| s.instances.clone()).collect();
         let group = Arc::new(Group { lists, count: solids.iter().map(Solid::mesh_count).sum() });
         let of = Arc::clone(&group);
         let instances = Meshes(later(move || {
-            let (mut first, mut instances) = (0u16, Vec::with_capacity(of.count));
-            for list in &of.lists {
+            let (mut first, mut object) = (0u16, 0u16);
+            let mut instances = Vec::with_capacity(of.count);
+            for (k, list) in of.lists.iter().enumerate() {
+                let name = names.get(k);
                 let numbered = |i: &Instance| Instance {
                     first_part: first.saturating_add(i.first_part),
+                    object: object.saturating_add(i.object),
+                    name: within(name, i.name.as_ref()),
                     ..i.clone()
                 };
                 instances.extend(list.iter().map(numbered));
                 first = first.saturating_add(list.part_count());
+                object = object.saturating_add(list.object_count());
             }
             instances.into()
         }));
@@ -297,6 +334,7 @@ impl Solid {
         let landmarks =
             later(move || unique(of.iter().flat_map(|landmarks| landmarks.iter().cloned())));
         let lazy_depth = solids.iter().map(|s| s.lazy_depth).max().unwrap_or(0) + 1;
+        let bodies: Vec<PosedBody> = solids.iter().flat_map(Solid::bodies).cloned().collect();
         Solid {
             instances,
             group: Some(group),
@@ -304,6 +342,7 @@ impl Solid {
             lazy_depth,
             revolution: None,
             joints: None,
+            bodies: (!bodies.is_empty()).then(|| bodies.into()),
         }
         .forced_if_deep()
     }
@@ -498,6 +537,14 @@ impl Solid {
             return Ok(mesh);
         }
         Ok(Mesh::of(positions, normals, Arc::new(t)))
+    }
+}
+
+/// Returns the name of an object of a group's member.
+fn within(member: Option<&Arc<str>>, own: Option<&Arc<str>>) -> Option<Arc<str>> {
+    match (member, own) {
+        (Some(member), Some(own)) => Some(format!("{member}_{own}").into()),
+        (name, own) => name.or(own).cloned(),
     }
 }
 

@@ -7,7 +7,7 @@
 use super::canvas::Canvas;
 use super::pixels::fractions::Fractions;
 use super::{Camera, Channels, ContourChange, Contours, Frame};
-use crate::geom::Solid;
+use crate::geom::{Affine, Solid};
 use glam::DVec3;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -39,6 +39,8 @@ struct Pictures {
 pub struct View {
     solid: Solid,
     camera: Camera,
+    /// The length of a metre in scene units, if it is known.
+    metre: Option<f64>,
     /// Shared with the views before and after it.
     canvas: Canvas,
     /// The pictures by size; few sizes are ever requested, so a list is enough.
@@ -55,11 +57,30 @@ impl View {
         View {
             solid,
             camera,
+            metre: None,
             canvas: Canvas::default(),
             pictures: Mutex::default(),
             read: Mutex::default(),
             read_before: Vec::new(),
         }
+    }
+
+    /// The view of a scene whose metre has this length, positive and finite, in scene units.
+    #[must_use]
+    pub fn in_metres(self, metre: f64) -> View {
+        View { metre: Some(metre), ..self }
+    }
+
+    /// The length of a metre in scene units, if it is known.
+    pub fn metre(&self) -> Option<f64> {
+        self.metre
+    }
+
+    /// The solid as files have it: in metres if their length is known, else in scene units.
+    pub fn solid_in_files(&self) -> Solid {
+        let by = |metre: f64| Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::splat(1.0 / metre));
+        let scale = self.metre.map(by).filter(Affine::is_finite);
+        scale.map_or_else(|| self.solid.clone(), |by| self.solid.placed(by))
     }
 
     /// Draws on the canvas of the view that this one follows, so that a drawing costs what

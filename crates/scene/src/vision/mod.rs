@@ -8,6 +8,7 @@
 
 pub mod candidates;
 pub mod chamfer;
+pub mod coco_runs;
 pub mod contour_ratio;
 pub mod depth;
 pub mod detect;

@@ -120,10 +120,10 @@ pub fn exported_operand(code: &Code, x: &Export) -> Option<Operand> {
 /// # Errors
 /// If a solid has no mesh, since it is too far away or too small for single precision.
 pub fn exported(value: &Value, file: &str) -> Result<Vec<u8>, String> {
-    let solid = value.downcast::<ViewValue>().map(|v| v.0.solid().clone());
+    let solid = value.downcast::<ViewValue>().map(|v| v.0.solid_in_files());
     let Some(solid) = solid.or_else(|| value.downcast::<SolidValue>().map(|s| s.0.clone())) else {
         return Ok(value.to_string().into_bytes());
     };
-    let mesh = solid.to_mesh().map_err(|e| e.to_string())?;
-    Ok(if file.ends_with(".glb") { glb::write(&mesh) } else { obj::write(&mesh).into_bytes() })
+    let all = solid.objects().map_err(|e| e.to_string())?;
+    Ok(if file.ends_with(".glb") { glb::write(&all) } else { obj::write(&all).into_bytes() })
 }

@@ -70,27 +70,39 @@ pub(super) const TABLE: &[Row] = &[
     native(
         "group",
         SECTION,
-        &[arg("solids", Type::Array, "The solids.")],
+        &[arg(
+            "solids",
+            Type::Any,
+            "The solids: an array, or a record, which names them in the files of a run: \
+             `{ cup: a, saucer: b }`.",
+        )],
         SOLID,
         "Several solids combined into one.",
         |a| {
-            let n = a.get(0).len().unwrap_or(0);
-            let members = (0..n).map(|i| {
-                let v = a.get(0).element(i).unwrap_or_default();
-                v.downcast::<SolidValue>()
-                    .map(|s| s.0.clone())
-                    .ok_or_else(|| a.element_wrong(0, "an array of solids", &v))
-            });
-            let members = members.collect::<Result<Vec<_>, _>>()?;
+            let wanted = "an array or record of solids";
+            let member = |v: &Value| {
+                let solid = v.downcast::<SolidValue>().map(|s| s.0.clone());
+                solid.ok_or_else(|| a.element_wrong(0, wanted, v))
+            };
+            let (names, members): (Vec<Arc<str>>, Vec<Solid>) = match a.get(0) {
+                Value::Record(all) => {
+                    let named = |(name, v): (&Arc<str>, &Value)| Ok((Arc::clone(name), member(v)?));
+                    all.iter().map(named).collect::<Result<Vec<_>, Fault>>()?.into_iter().unzip()
+                }
+                array => {
+                    let all = (0..array.len().unwrap_or(0)).map(|i| array.element(i).unwrap_or_default());
+                    (Vec::new(), all.map(|v| member(&v)).collect::<Result<_, _>>()?)
+                }
+            };
             if members.is_empty() {
-                return Err(a.wrong(0, "an array of solids"));
+                return Err(a.wrong(0, wanted));
             }
             let count: usize = members.iter().map(Solid::mesh_count).sum();
             if count > MOST_MESHES {
                 let message = format!("scene.group: a group of {count} meshes; at most {MOST_MESHES}");
                 return Err(Fault::new(FaultKind::Limit, message));
             }
-            Ok(Value::object(SolidValue::new(Solid::group(&members))))
+            Ok(Value::object(SolidValue::new(Solid::named_group(&members, names))))
         },
     )
     .vjp(vjps::group),

@@ -76,8 +76,7 @@ pub(super) fn group(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints>
         *rest = after;
         own.to_vec()
     };
-    let one = |i: usize| {
-        let member = a.get(0).element(i)?;
+    let mut one = |member: &Value| {
         let solid = &member.downcast::<SolidValue>()?.0;
         let own = BySolid {
             landmarks: next(&mut landmarks, solid.landmarks().len()),
@@ -89,7 +88,17 @@ pub(super) fn group(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints>
         };
         Some(own.into_adjoint())
     };
-    Some(smallvec![Adjoint::List((0..a.get(0).len()?).map(one).collect::<Option<_>>()?)])
+    let by_members = match a.get(0) {
+        Value::Record(all) => {
+            let named = |(name, v): (&Arc<str>, &Value)| Some((Arc::clone(name), one(v)?));
+            Adjoint::Record(all.iter().map(named).collect::<Option<_>>()?)
+        }
+        array => {
+            let all = (0..array.len()?).map(|i| one(&array.element(i)?));
+            Adjoint::List(all.collect::<Option<_>>()?)
+        }
+    };
+    Some(smallvec![by_members])
 }
 
 /// For `scene.centred`: the bounding box moves with the vertices on its sides.

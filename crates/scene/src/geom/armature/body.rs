@@ -8,7 +8,7 @@
 
 use super::Rig;
 use super::morph::{Anchor, Morph};
-use crate::geom::{Affine, GeomError, Instance, Mesh, Topology, edges, outer};
+use crate::geom::{GeomError, Instance, Mesh, Topology, edges, outer};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
 use std::sync::{Arc, LazyLock};
 
@@ -148,7 +148,7 @@ impl Armature {
                 }
             }
         }
-        let parts = parts(rig.joints().len(), &triangles, &influences);
+        let parts = parts(&rig, &triangles, &influences);
         let surface = Surface::new(positions, &triangles);
         let anchors =
             rig.keypoints().iter().map(|k| Anchor::of(k, &rig, &surface.positions)).collect();
@@ -341,7 +341,7 @@ impl Armature {
                 .push(Vec3::from((cofactor(&m.matrix3) * Vec3A::from(n)).normalize_or(Vec3A::Y)));
         }
         let mesh = Arc::new(Mesh::of(positions, normals, Arc::clone(&part.topology)));
-        Instance { mesh, affine: Affine::IDENTITY, first_part: part.joint }
+        Instance { first_part: part.joint, ..Instance::new(mesh) }
     }
 
     /// The vector-Jacobian product of posing with respect to the joints' transforms,
@@ -389,7 +389,8 @@ fn cofactor(m: &Mat3A) -> Mat3A {
 
 /// Cuts the triangles into parts by the joint with the largest weight in each; the first
 /// in rig order on ties.
-fn parts(joints: usize, triangles: &[[u32; 3]], influences: &[Influence]) -> Vec<Part> {
+fn parts(rig: &Rig, triangles: &[[u32; 3]], influences: &[Influence]) -> Vec<Part> {
+    let joints = rig.joints().len();
     let mut by_joint: Vec<Vec<[u32; 3]>> = vec![Vec::new(); joints];
     let mut sums = vec![0.0f64; joints];
     for t in triangles {
@@ -431,6 +432,7 @@ fn parts(joints: usize, triangles: &[[u32; 3]], influences: &[Influence]) -> Vec
             parts: vec![0; faces.len()],
             triangles: faces,
             part_count: 1,
+            part_names: vec![Arc::clone(&rig.joints()[joint].name)],
             encloses: true,
             ..Topology::default()
         };

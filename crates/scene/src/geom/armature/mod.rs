@@ -2,12 +2,14 @@
 //! 2.1.2.
 
 mod body;
+pub mod bvh;
 mod kinematics;
 mod morph;
 mod pose;
 mod posed;
 mod rig;
 mod rig_json;
+mod skeleton;
 mod stretch;
 mod torque;
 
@@ -18,5 +20,6 @@ pub use pose::{JointPose, Rules, Turn};
 pub use posed::Posed;
 pub use rig::{Joint, Keypoint, MOST_JOINTS, NamedJoint, Rig};
 pub use rig_json::{RigFile, morphs_from_json, rig_from_json};
+pub use skeleton::{Bone, PosedBody, quaternion, rotation_vector};
 pub use stretch::Stretch;
 pub use torque::BodyGradient;

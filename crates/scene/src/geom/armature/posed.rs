@@ -2,7 +2,7 @@
 //! in the pose before it; renderers draw shared meshes once.
 
 use super::body::{Armature, Part};
-use super::{JointPose, Keypoint, Rules};
+use super::{JointPose, Keypoint, PosedBody, Rules};
 use crate::geom::{GeomError, Instance, Landmark, Solid};
 use glam::{Affine3A, DAffine3};
 use std::sync::{Arc, OnceLock};
@@ -97,7 +97,8 @@ impl Armature {
             };
             body.rig().keypoints().iter().map(landmark).collect()
         };
-        let solid = Solid::of_parts(parts).with_joints(transforms);
+        let posed_body = PosedBody::new(Arc::clone(self), transforms);
+        let solid = Solid::of_parts(parts).with_body(posed_body);
         // A rig's keypoints have different names; `#` starts the numbers of others.
         let solid = match self.rig().keypoints().iter().any(|k| k.name.contains('#')) {
             true => solid.with_landmarks_of(move || landmarks().to_vec()),

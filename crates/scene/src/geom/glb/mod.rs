@@ -1,31 +1,33 @@
-//! Writes binary glTF 2.0 files (Khronos, glTF 2.0 specification, section 4.4): a mesh,
-//! or several states of a scene as an animation.
+//! Writes binary glTF 2.0 files (Khronos, glTF 2.0 specification, section 4.4): objects, each a
+//! mesh and a node with its name, or several states of a scene as an animation.
 //!
-//! No materials and no parts. Invariant: both chunks are complete and aligned to four
-//! bytes.
+//! No materials. Invariant: both chunks are complete and aligned to four bytes.
 
 mod animation;
 mod channels;
 mod document;
 mod morphs;
 
-use super::Mesh;
+use super::Object;
 pub use animation::write_animation;
 use document::Document;
 use serde_json::json;
 
-/// Returns the bytes of a `.glb` file of one mesh.
-pub fn write(mesh: &Mesh) -> Vec<u8> {
+/// Returns the bytes of a `.glb` file of some objects.
+pub fn write(objects: &[Object]) -> Vec<u8> {
     let mut d = Document::default();
-    let positions = d.positions(&mesh.positions);
-    let normals = d.vectors(&mesh.normals);
-    let corners = d.corners(&mesh.topology.triangles);
-    let mesh = d.mesh(json!({
-        "primitives": [{
-            "attributes": { "POSITION": positions, "NORMAL": normals }, "indices": corners,
-        }],
-    }));
-    d.node(json!({ "mesh": mesh }));
+    for Object { name, mesh } in objects {
+        let positions = d.positions(&mesh.positions);
+        let normals = d.vectors(&mesh.normals);
+        let corners = d.corners(&mesh.topology.triangles);
+        let mesh = d.mesh(json!({
+            "name": name,
+            "primitives": [{
+                "attributes": { "POSITION": positions, "NORMAL": normals }, "indices": corners,
+            }],
+        }));
+        d.node(json!({ "name": name, "mesh": mesh }));
+    }
     d.finish()
 }
 
@@ -36,7 +38,7 @@ mod tests {
     #[test]
     fn chunks_are_whole_and_aligned() {
         let m = crate::geom::cuboid(glam::DVec3::ONE).unwrap();
-        let glb = write(&m);
+        let glb = write(&[m.clone().into()]);
         let word = |at: usize| {
             u32::from_le_bytes([glb[at], glb[at + 1], glb[at + 2], glb[at + 3]]) as usize
         };
@@ -46,6 +48,7 @@ mod tests {
         let document: serde_json::Value =
             serde_json::from_slice(&glb[20..20 + json_length]).unwrap();
         assert_eq!(word(20 + json_length), 24 * 24 + 36 * 4);
+        assert_eq!(document["nodes"][0]["name"], "object");
         assert_eq!(document["accessors"][0]["min"], json!([-0.5, -0.5, -0.5]));
         assert_eq!(document["accessors"][2]["count"], 36);
         assert_eq!(&glb[24 + json_length..28 + json_length], b"BIN\0");
@@ -54,7 +57,7 @@ mod tests {
     #[test]
     fn the_numbers_are_the_mesh_s() {
         let m = crate::geom::sphere(0.7, 6).unwrap();
-        let glb = write(&m);
+        let glb = write(&[m.clone().into()]);
         let start = 28 + u32::from_le_bytes([glb[12], glb[13], glb[14], glb[15]]) as usize;
         let words: Vec<[u8; 4]> =
             glb[start..].chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect();
