@@ -34,8 +34,7 @@ def parts(store):
     """The quantities under their names in the files of chains: the fields of a record one by one."""
     posterior = store["posterior"]
     for name, variable in posterior.data_vars.items():
-        # A name that occurs twice there has a number.
-        plain = re.sub(r"\W+", "_", name).rstrip("_") if re.search(r"\W", name) else name
+        plain = re.sub(r"[\W_]+", "_", name).rstrip("_") if re.search(r"\W|__", name) else name
         field = f"{name}_field"
         if field in variable.dims:
             for f in variable[field].values:
