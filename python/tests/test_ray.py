@@ -306,6 +306,22 @@ def test_an_attempt_goes_on_from_the_checkpoint_of_another(dataset: Path, tmp_pa
     assert (target / "run.json").stat().st_ino == before
 
 
+def test_texts_of_several_nodes_have_the_same_numbers() -> None:
+    from pcadlang.ray.chains import Groups, joined
+
+    def node(codes: list[float], texts: list[str]) -> Groups:
+        draw = (["draw"], np.arange(2))
+        kind = (["chain", "draw"], np.array([codes]))
+        level = (["kind_level"], np.array(texts))
+        return {"posterior": {"draw": draw, "kind_level": level, "kind": kind}}
+
+    both = joined([node([0, 1], ["cup", "vase"]), node([1, 0], ["lamp", "cup"])])["posterior"]
+    assert both["kind_level"][1].tolist() == ["cup", "vase", "lamp"]
+    assert both["kind"][1].tolist() == [[0, 1], [0, 2]]
+    missing = joined([node([0, np.nan], ["cup"]), node([0, 0], ["lamp"])])["posterior"]
+    np.testing.assert_array_equal(missing["kind"][1], [[0, np.nan], [1, 1]])
+
+
 def test_chains_on_nodes_are_those_of_one_process(nodes: Nodes, tmp_path: Path) -> None:
     nodes.add()
     text = "assume w ~ mv_normal([0, 0], [[1, 0], [0, 1]]); observe normal(w[0], 1) = [1, 2] as y;"

@@ -89,6 +89,29 @@ def test_groups_and_summaries_are_those_of_the_draws() -> None:
         posterior["z"]
 
 
+def test_shapes_fields_and_texts_survive() -> None:
+    text = """
+    assume a ~ normal(0, 1);
+    assume R = [[a, 1, 2], [3, 4, 5]];
+    assume P = { x: a, y: 2 * a };
+    assume parts = [{ r: 1, h: a }, { r: 2, h: 2 * a }, { r: 3, h: 3 * a }];
+    assume kind = if a > 0 { "vase" } else { "cup" };
+    """
+    posterior = pcadlang.Program.parse(text).compile().sample(chains=2, steps=200, seed=1)
+    a = posterior["a"]
+    groups = posterior.groups()["posterior"]
+    assert groups["R"][0] == ["chain", "draw", "R_dim_0", "R_dim_1"]
+    np.testing.assert_array_equal(posterior["R"][..., 0, 0], a)
+    np.testing.assert_array_equal(posterior["R"][..., 1, 2], 5)
+    assert groups["P_field"][1].tolist() == ["x", "y"]
+    np.testing.assert_array_equal(posterior["P"][..., 1], 2 * a)
+    assert groups["parts"][0] == ["chain", "draw", "parts_dim_0", "parts_field"]
+    np.testing.assert_array_equal(posterior["parts"][..., 2, 1], 3 * a)
+    kinds = groups["kind_level"][1][posterior["kind"]]
+    np.testing.assert_array_equal(kinds, np.where(a > 0, "vase", "cup"))
+    assert "R[1,2]" in posterior.summary()
+
+
 def test_arviz_has_the_same_numbers() -> None:
     arviz = pytest.importorskip("arviz")
     posterior = pcadlang.Program.parse(CONJUGATE).compile().sample(chains=4, steps=101, seed=1)

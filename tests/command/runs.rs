@@ -3,6 +3,7 @@
 
 use crate::common::folder::{Folder, disc, png};
 use crate::common::snapshots::assert_session;
+use serde_json::Value;
 
 /// Returns a summary without its times, with numbers to six decimal places.
 fn timeless(json: &str) -> serde_json::Value {
@@ -66,6 +67,91 @@ fn draws(f: &Folder, dir: &str, chains: usize) -> Vec<String> {
         text.lines().filter(|l| !l.starts_with('#')).map(|l| format!("{l}\n")).collect()
     };
     (1..=chains).map(chain).collect()
+}
+
+/// Matrices, records and texts have their shape, fields and meaning in every file and table.
+#[test]
+fn shapes_fields_and_texts_survive() {
+    let f = Folder::new("shapes");
+    f.write(
+        "shapes.pcad",
+        "assume a ~ normal(0, 1);
+         assume R = [[a, 1, -0.0], [3, 4, 5]];
+         assume P = { x: a, y: 2 * a };
+         assume parts = [{ r: 1, h: a }, { r: 2, h: 3 * a }];
+         assume kind = if a > 0 { \"thin = vase\" } else { \"cup\" };
+         infer { warmup 30 { drift(@a); } repeat 200 { drift(@a); } }",
+    );
+    let run = ["run", "shapes.pcad", "--seed", "1", "--chains", "2", "--out", "out"];
+    let said = f.succeeds(&run).out;
+    let row = |name: &str| {
+        let line = said.lines().find(|l| l.split_whitespace().next() == Some(name));
+        line.unwrap_or_else(|| panic!("{name}: {said}")).split_whitespace().collect::<Vec<_>>()
+    };
+    assert_eq!(row("R[1,2]")[1..5], ["5", "0", "5", "5"]);
+    assert_eq!(row("R[0,2]")[1..5], ["0", "0", "0", "0"], "not -0");
+    assert!(row("parts/h[1]").len() == 8 && said.contains("%)"), "{said}");
+    let summary: Value = serde_json::from_str(&f.read("out/summary.json")).unwrap();
+    let text = summary["quantities"]["kind"]["most_frequent"]["text"].as_str().unwrap();
+    assert!(["thin = vase", "cup"].contains(&text));
+
+    for (i, chain) in draws(&f, "out", 2).iter().enumerate() {
+        let all = f.read(&format!("out/chain-{}.csv", i + 1));
+        let said = |key: &str| {
+            let line = all.lines().find(|l| l.starts_with(&format!("# {key} = "))).unwrap();
+            line.split_once(" = ").unwrap().1.trim_end().to_owned()
+        };
+        let counts = ["num_samples", "num_warmup", "save_warmup", "thin"].map(said);
+        assert_eq!(counts, ["200", "30", "0", "1"]);
+        assert_eq!([said("method"), said("algorithm")], ["sample", "drift"]);
+        for time in ["(Warm-up)", "(Sampling)", "(Total)"] {
+            assert!(all.contains(&format!(" seconds {time}\n")), "{all}");
+        }
+        let levels = all.lines().find_map(|l| l.strip_prefix("# levels of kind: ")).unwrap();
+        let levels: Vec<String> = serde_json::from_str(levels).unwrap();
+        let mut lines = chain.lines();
+        let names: Vec<&str> = lines.next().unwrap().split(',').skip(6).collect();
+        let wanted = "a,R.1.1,R.2.1,R.1.2,R.2.2,R.1.3,R.2.3,P_x,P_y,parts_r.1,parts_r.2,parts_h.1,parts_h.2,kind";
+        assert_eq!(names.join(","), wanted);
+        assert_eq!(lines.clone().count(), 200);
+        for line in lines {
+            let x: Vec<f64> = line.split(',').skip(6).map(|x| x.parse().unwrap()).collect();
+            assert_eq!(x[1..7], [x[0], 3.0, 1.0, 4.0, 0.0, 5.0]);
+            assert_eq!(x[7..13], [x[0], 2.0 * x[0], 1.0, 2.0, x[0], 3.0 * x[0]]);
+            assert_eq!(levels[x[13] as usize], if x[0] > 0.0 { "thin = vase" } else { "cup" });
+        }
+    }
+    let dims = |name: &str| {
+        let file = f.read(&format!("out/inference.zarr/posterior/{name}/.zattrs"));
+        serde_json::from_str::<Value>(&file).unwrap()["_ARRAY_DIMENSIONS"].to_string()
+    };
+    assert_eq!(dims("R"), r#"["chain","draw","R_dim_0","R_dim_1"]"#);
+    assert_eq!(dims("P"), r#"["chain","draw","P_field"]"#);
+    assert_eq!(dims("parts"), r#"["chain","draw","parts_dim_0","parts_field"]"#);
+    assert_eq!(dims("kind_level"), r#"["kind_level"]"#);
+    // The page made from the folder has the same names.
+    f.succeeds(&["report", "out"]);
+    let page = f.read("out/report.html");
+    assert!(page.contains("R[<wbr>1,<wbr>2]") && page.contains(&format!("<td>{text} (")));
+}
+
+/// Chains that a time limit ends have the same counts, which are those of their draws.
+#[test]
+fn counts_are_those_of_the_draws() {
+    let f = Folder::new("counts");
+    f.write("slow.pcad", "assume k ~ poisson(3); assume w = map(fn(i) { i }, 0 .. k); observe normal(k, 1) = 3;");
+    f.succeeds(&["run", "slow.pcad", "--time", "1s", "--chains", "3", "--quiet", "--out", "out"]);
+    let of = |i: usize| {
+        let text = f.read(&format!("out/chain-{i}.csv"));
+        let count = |key: &str| {
+            let line = text.lines().find_map(|l| l.strip_prefix(&format!("# {key} = "))).unwrap();
+            line.trim_end().parse::<usize>().unwrap()
+        };
+        assert_eq!(count("num_samples"), text.lines().filter(|l| !l.starts_with('#')).count() - 1);
+        assert!(text.ends_with("# \n"), "times come last");
+        (count("num_samples"), count("num_warmup"))
+    };
+    assert!(of(1).0 > 0 && of(1) == of(2) && of(2) == of(3));
 }
 
 /// Columns of `log_lik` are of the same observations in all chains, or are left out, so that
@@ -162,8 +248,8 @@ fn starts_of_the_lathe_are_seen_in_perspective() {
             let at = names.split(',').position(|n| n == name).unwrap_or_else(|| panic!("{names}"));
             row.trim().split(',').nth(at).unwrap().parse().unwrap()
         };
-        if (number("S_L/axis/z").asin() - 25f64.to_radians()).abs() < 0.07 {
-            near.push((number("H"), number("S_L/translate/y")));
+        if (number("S_L_axis_z").asin() - 25f64.to_radians()).abs() < 0.07 {
+            near.push((number("H"), number("S_L_translate_y")));
         }
     }
     assert!(near.len() >= 5, "{near:?}");

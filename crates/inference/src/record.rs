@@ -1,11 +1,12 @@
 //! Records draws: determines the columns, and flattens values into them.
 
-use super::draws::{Column, MOST_POINTS, POINTWISE, Shape, merged};
+use super::draws::{Column, MOST_LEVELS, MOST_POINTS, POINTWISE, Shape, merged, width};
 use pcadlang_engine::lang::code::{Code, Operand};
 use pcadlang_engine::lang::error::RunError;
 use pcadlang_engine::lang::plan::Plan;
-use pcadlang_engine::lang::value::Value;
+use pcadlang_engine::lang::value::{Record, Value};
 use pcadlang_engine::trace::{Draws, Trace};
+use std::borrow::Cow;
 
 /// The columns recorded with every draw.
 #[derive(Debug)]
@@ -100,51 +101,71 @@ impl Recorder {
     }
 
     /// Returns the row of a draw, with NaN for columns that it lacks, and whether columns
-    /// were added or extended for it. Numbers, bools, and arrays and records of them are
-    /// recorded; other values are left out.
+    /// were added or extended for it. Numbers, bools, texts, and arrays and records of them are
+    /// recorded; other values are left out. The fields of a record are columns; those of an
+    /// array of records are arrays.
     pub fn row(&mut self, values: &[(String, Value)]) -> (Vec<f64>, bool) {
         let (row, fits) = self.flatten(values);
         if fits {
             return (row, false);
         }
         let mut here = Vec::new();
-        values.iter().for_each(|(name, v)| add_columns(name, v, &mut here));
+        values.iter().for_each(|(name, v)| add_columns(name.clone(), v, false, &mut here));
         let before = self.columns.clone();
         self.columns = if before.is_empty() { here } else { merged(&before, &here) };
+        self.columns.iter_mut().for_each(|c| c.levels.truncate(MOST_LEVELS));
         (self.flatten(values).0, self.columns != before)
     }
 
     /// The row, and whether it holds all of the values.
     fn flatten(&self, values: &[(String, Value)]) -> (Vec<f64>, bool) {
-        let mut row = Vec::new();
-        let (mut found, mut fits) = (0, true);
+        let mut row = vec![f64::NAN; width(&self.columns)];
+        let (mut found, mut fits, mut at) = (0, true, 0);
         for c in &self.columns {
-            let mut flat = Vec::new();
+            let own = &mut row[at..at + c.shape.len()];
+            at += own.len();
             if let Some(v) = find(values, &c.name) {
-                flatten(v, &mut flat);
+                fits &= place(&v, c, c.shape.dims(), own);
                 found += 1;
             }
-            fits &= flat.len() <= c.shape.len();
-            flat.resize(c.shape.len(), f64::NAN);
-            row.extend(flat);
         }
         let asked: usize = values.iter().map(|(_, v)| leaves(v)).sum();
         (row, fits && found >= asked)
     }
 }
 
-fn add_columns(name: &str, v: &Value, columns: &mut Vec<Column>) {
+/// The first of an array of records, if all have the same fields.
+fn records(v: &Value) -> Option<(&Record, &[Value])> {
+    let Value::List(all) = v else { return None };
+    let Value::Record(first) = all.first()? else { return None };
+    let same = |v: &Value| matches!(v, Value::Record(r) if r.keys().eq(first.keys()));
+    all.iter().all(same).then_some((first, all))
+}
+
+/// One field of each record of an array.
+fn gathered(all: &[Value], field: &str) -> Value {
+    let of = |v: &Value| match v {
+        Value::Record(r) => r.get(field).cloned(),
+        _ => None,
+    };
+    Value::from_elements(all.iter().filter_map(of).collect())
+}
+
+fn add_columns(name: String, v: &Value, is_field: bool, columns: &mut Vec<Column>) {
+    if let Some((first, all)) = records(v) {
+        for field in first.keys() {
+            add_columns(format!("{name}/{field}"), &gathered(all, field), true, columns);
+        }
+        return;
+    }
     match v {
-        Value::Num(_) | Value::Bool(_) => {
-            columns.push(Column { name: name.into(), shape: Shape::Scalar })
-        }
-        Value::Array(_) | Value::List(_) => {
-            let mut flat = Vec::new();
-            flatten(v, &mut flat);
-            columns.push(Column { name: name.into(), shape: Shape::Vector(flat.len()) });
-        }
         Value::Record(r) => {
-            r.iter().for_each(|(k, v)| add_columns(&format!("{name}/{k}"), v, columns))
+            r.iter().for_each(|(k, v)| add_columns(format!("{name}/{k}"), v, true, columns))
+        }
+        v if leaves(v) == 1 => {
+            let mut levels = Vec::new();
+            add_levels(v, &mut levels);
+            columns.push(Column { is_field, levels, ..Column::new(name, shape(v)) });
         }
         _ => {}
     }
@@ -153,33 +174,109 @@ fn add_columns(name: &str, v: &Value, columns: &mut Vec<Column>) {
 /// The number of columns of a value.
 fn leaves(v: &Value) -> usize {
     match v {
-        Value::Num(_) | Value::Bool(_) | Value::Array(_) | Value::List(_) => 1,
+        Value::Num(_) | Value::Bool(_) | Value::Str(_) | Value::Array(_) => 1,
+        Value::List(_) => records(v).map_or(1, |(_, all)| leaves(&all[0])),
         Value::Record(r) => r.values().map(leaves).sum(),
         _ => 0,
     }
 }
 
+/// The shape of a value: nested arrays of equal shapes have their dimensions, all others are
+/// vectors of what they hold.
+fn shape(v: &Value) -> Shape {
+    match v {
+        Value::Array(xs) => Shape::Array(vec![xs.len()]),
+        Value::List(all) => {
+            let first = all.first().map_or(Shape::Scalar, shape);
+            match all.iter().all(|x| shape(x) == first) {
+                true => Shape::Array([&[all.len()], first.dims()].concat()),
+                false => Shape::Array(vec![count(v)]),
+            }
+        }
+        Value::Record(_) => Shape::Array(vec![count(v)]),
+        _ => Shape::Scalar,
+    }
+}
+
+fn count(v: &Value) -> usize {
+    match v {
+        Value::Array(xs) => xs.len(),
+        Value::List(all) => all.iter().map(count).sum(),
+        Value::Record(r) => r.values().map(count).sum(),
+        _ => 1,
+    }
+}
+
+/// Adds the different texts in a value.
+fn add_levels(v: &Value, levels: &mut Vec<String>) {
+    match v {
+        Value::Str(s) if levels.len() < MOST_LEVELS && !levels.iter().any(|l| **l == **s) => {
+            levels.push(s.to_string())
+        }
+        Value::List(all) => all.iter().for_each(|v| add_levels(v, levels)),
+        Value::Record(r) => r.values().for_each(|v| add_levels(v, levels)),
+        _ => {}
+    }
+}
+
 /// The value of a column: parts of its name between slashes are fields of records.
-fn find<'a>(values: &'a [(String, Value)], column: &str) -> Option<&'a Value> {
+fn find<'a>(values: &'a [(String, Value)], column: &str) -> Option<Cow<'a, Value>> {
     values.iter().find_map(|(name, v)| {
         let rest = column.strip_prefix(name.as_str())?;
         if rest.is_empty() {
-            return Some(v);
+            return Some(Cow::Borrowed(v));
         }
-        rest.strip_prefix('/')?.split('/').try_fold(v, |v, field| match v {
-            Value::Record(r) => r.get(field),
-            _ => None,
+        let mut fields = rest.strip_prefix('/')?.split('/');
+        fields.try_fold(Cow::Borrowed(v), |v, field| {
+            if let Some((first, all)) = records(&v) {
+                return first.contains_key(field).then(|| Cow::Owned(gathered(all, field)));
+            }
+            match v {
+                Cow::Borrowed(Value::Record(r)) => r.get(field).map(Cow::Borrowed),
+                Cow::Owned(Value::Record(r)) => r.get(field).cloned().map(Cow::Owned),
+                _ => None,
+            }
         })
     })
 }
 
-fn flatten(v: &Value, out: &mut Vec<f64>) {
+/// Writes the numbers of a value to their places in an array of these dimensions. Returns
+/// whether each has one.
+fn place(v: &Value, column: &Column, dims: &[usize], out: &mut [f64]) -> bool {
+    match (v, dims) {
+        (Value::Array(xs), [n]) if xs.len() <= *n && column.levels.is_empty() => {
+            out[..xs.len()].copy_from_slice(xs);
+            true
+        }
+        (Value::List(all), [n, inner @ ..]) if all.len() <= *n && !inner.is_empty() => {
+            let parts = out.chunks_mut((out.len() / n).max(1));
+            all.iter().zip(parts).fold(true, |fits, (v, part)| place(v, column, inner, part) && fits)
+        }
+        _ => {
+            let (mut flat, mut known) = (Vec::new(), true);
+            flatten(v, column, &mut flat, &mut known);
+            let fits = dims.len() < 2 && flat.len() <= out.len();
+            out.iter_mut().zip(flat).for_each(|(to, x)| *to = x);
+            fits && known
+        }
+    }
+}
+
+/// Adds the numbers of a value; `known` becomes false at a text that the column lacks.
+fn flatten(v: &Value, column: &Column, out: &mut Vec<f64>, known: &mut bool) {
+    let is_text = !column.levels.is_empty();
     match v {
-        Value::Num(x) => out.push(*x),
-        Value::Bool(b) => out.push(f64::from(u8::from(*b))),
-        Value::Array(xs) => out.extend(xs.iter()),
-        Value::List(xs) => xs.iter().for_each(|x| flatten(x, out)),
-        Value::Record(r) => r.values().for_each(|x| flatten(x, out)),
+        Value::Num(x) if !is_text => out.push(*x),
+        Value::Bool(b) if !is_text => out.push(f64::from(u8::from(*b))),
+        Value::Array(xs) if !is_text => out.extend(xs.iter()),
+        Value::Array(xs) => out.extend(xs.iter().map(|_| f64::NAN)),
+        Value::Str(s) => {
+            let level = column.levels.iter().position(|l| **l == **s);
+            *known &= level.is_some() || !is_text || column.levels.len() >= MOST_LEVELS;
+            out.push(level.map_or(f64::NAN, |n| n as f64));
+        }
+        Value::List(all) => all.iter().for_each(|v| flatten(v, column, out, known)),
+        Value::Record(r) => r.values().for_each(|v| flatten(v, column, out, known)),
         _ => out.push(f64::NAN),
     }
 }

@@ -10,7 +10,7 @@
 //! chain.
 
 use super::atomic_write::begin;
-use super::csv::{Contents, CsvError, CsvSink, DrawReader};
+use super::csv::{Contents, CsvError, CsvSink, DrawReader, with_counts};
 use super::draws::{ChainDraws, Quantity, widen};
 use super::rundir::RunDir;
 use super::sinks::Memory;
@@ -35,6 +35,10 @@ pub(super) fn all_name(chain: u32) -> String {
 /// draws were left out. Without `pointwise`, the log densities of single observed values are
 /// left out: they are of other observations in other chains.
 ///
+/// The heads of all files then say how many draws they hold, and how many steps the warm-up
+/// had; where a time limit made these differ, the most of any chain, since readers want one
+/// number.
+///
 /// # Errors
 /// Returns an error if a file cannot be read or written.
 pub fn align(dir: &Path, chains: u32, even: bool, pointwise: bool) -> io::Result<Option<u64>> {
@@ -46,12 +50,25 @@ pub fn align(dir: &Path, chains: u32, even: bool, pointwise: bool) -> io::Result
     let all = found.iter().fold(Vec::new(), |all, f| merged(&all, &f.columns));
     let mut columns = all.clone();
     columns.retain(|c| pointwise || c.name != POINTWISE);
+    let warmup = found.iter().filter_map(Contents::warmup).max().unwrap_or(0);
     for (chain, f) in (0..chains).zip(&found).filter(|(_, f)| f.draws > 0) {
+        let draws = f.draws.min(keep);
         if f.draws > keep || f.heads != 1 || f.columns != columns {
-            rewrite(dir, chain, f, (&all, &columns), keep)?;
+            let head = with_counts(&f.settings(), warmup, draws);
+            rewrite(dir, chain, (&head, &f.tail), (&all, &columns), draws)?;
+        } else {
+            fill_in(&dir.join(draws_name(chain)), f, &with_counts(&f.head, warmup, draws))?;
         }
     }
     Ok((keep < most).then_some(keep))
+}
+
+/// Replaces the comments at the head of a file by others of the same length.
+fn fill_in(path: &Path, found: &Contents, head: &str) -> io::Result<()> {
+    if head == found.head || head.len() as u64 != found.head_end {
+        return Ok(());
+    }
+    File::options().write(true).open(path)?.write_all(head.as_bytes())
 }
 
 /// Restores all draws of a chain's file, if some were set aside.
@@ -78,24 +95,24 @@ pub(super) fn look(path: &Path) -> io::Result<Contents> {
 fn rewrite(
     dir: &Path,
     chain: u32,
-    found: &Contents,
+    (head, tail): (&str, &str),
     (all, columns): (&[Column], &[Column]),
-    keep: u64,
+    draws: u64,
 ) -> io::Result<()> {
     let path = dir.join(draws_name(chain));
     let layout = Layout::new(all, columns);
     let mut reader = DrawReader::new(BufReader::new(File::open(&path)?), all, u64::MAX);
     let new = begin(dir, &draws_name(chain), |file| {
         let mut out = BufWriter::new(file);
-        out.write_all(found.comments.as_bytes())?;
+        out.write_all(head.as_bytes())?;
         let mut sink = CsvSink::bare(out);
         sink.columns(columns)?;
-        for draw in 0..keep.min(found.draws) {
+        for draw in 0..draws {
             let Some(row) = reader.next_row().map_err(CsvError::into_io)? else { break };
             let values = layout.apply(&row.values);
             sink.draw(&DrawRow { chain, draw, values, ..row })?;
         }
-        sink.flush()
+        sink.end(tail)
     })?;
     std::fs::rename(&path, dir.join(all_name(chain)))?;
     new.end()

@@ -29,7 +29,29 @@ impl Default for ChainDraws {
 impl Quantity {
     /// Makes a quantity of the draws of each chain, which are not numbers of categories.
     pub fn new(name: &str, column: Option<usize>, chains: Vec<Vec<f64>>) -> Quantity {
-        Quantity { name: name.into(), column, summary: summary(&chains), chains, frequent: None }
+        let summary = summary(&chains);
+        let sizes = [summary.mean, summary.q05, summary.q95].map(f64::abs);
+        let size = sizes.into_iter().filter(|x| x.is_finite()).fold(0.0, f64::max);
+        Quantity {
+            name: name.into(),
+            column,
+            chains,
+            summary,
+            levels: Vec::new(),
+            frequent: None,
+            noise: ROUNDING * size,
+        }
+    }
+
+    /// Formats a number about it, with 0 for what is only the error of rounding.
+    pub fn number(&self, x: f64) -> String {
+        number(if x.abs() < self.noise { 0.0 } else { x })
+    }
+
+    /// Returns whether all draws are the same number.
+    pub(super) fn is_constant(&self) -> bool {
+        let mut all = self.chains.iter().flatten();
+        all.next().is_some_and(|first| all.all(|x| x == first))
     }
 
     /// Returns the reason why R-hat is undefined; `None` if it is defined.
@@ -109,22 +131,35 @@ pub struct Quantity {
     pub chains: Vec<Vec<f64>>,
     /// The summary of the draws.
     pub summary: Summary,
+    /// Of text, its different values; a draw is the place of one, counted from 0.
+    pub levels: Vec<String>,
     /// The most frequent value, if values are numbers of categories, which have no mean.
     pub frequent: Option<Frequent>,
+    /// Smaller numbers are errors of rounding, beside the other elements of its array.
+    noise: f64,
 }
 
+/// The error of rounding, relative to the largest number of a quantity.
+const ROUNDING: f64 = 1e-12;
+
 /// The most frequent of several values.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Frequent {
     /// The value; the smallest, if several are as frequent.
     pub value: f64,
+    /// What it stands for, if it is a text.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub text: Option<String>,
     /// The fraction of draws with that value.
     pub share: f64,
 }
 
 impl Frequent {
-    /// Returns the most frequent number; `None` if there are none, or one is NaN.
-    pub(super) fn of<'a>(numbers: impl Iterator<Item = &'a f64>) -> Option<Frequent> {
+    /// Returns the most frequent number, with its text; `None` if there are none, or one is NaN.
+    pub(super) fn of<'a>(
+        numbers: impl Iterator<Item = &'a f64>,
+        levels: &[String],
+    ) -> Option<Frequent> {
         let mut all: Vec<f64> = numbers.copied().collect();
         all.sort_by(f64::total_cmp);
         if all.last()?.is_nan() {
@@ -136,20 +171,22 @@ impl Frequent {
                 most = (run.len(), run[0]);
             }
         }
-        Some(Frequent { value: most.1, share: most.0 as f64 / all.len() as f64 })
+        let text = levels.get(most.1 as usize).cloned();
+        Some(Frequent { value: most.1, text, share: most.0 as f64 / all.len() as f64 })
     }
 }
 
 impl fmt::Display for Frequent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} ({:.0}%)", number(self.value), 100.0 * self.share)
+        let value = self.text.clone().unwrap_or_else(|| number(self.value));
+        write!(f, "{value} ({:.0}%)", 100.0 * self.share)
     }
 }
 
 /// Marks the quantities whose values are numbers of categories, by their names.
 pub fn mark_categories(quantities: &mut [Quantity], is: impl Fn(&str) -> bool) {
     for q in quantities.iter_mut().filter(|q| is(&q.name)) {
-        q.frequent = Frequent::of(q.chains.iter().flatten());
+        q.frequent = Frequent::of(q.chains.iter().flatten(), &q.levels);
     }
 }
 
@@ -182,14 +219,18 @@ pub fn quantities(chains: &[ChainDraws]) -> Vec<Quantity> {
             at += 1;
             continue;
         }
-        for i in 0..column.shape.len() {
-            let name = match column.shape {
-                Shape::Scalar => column.name.clone(),
-                Shape::Vector(_) => format!("{}[{i}]", column.name),
-            };
-            out.push(quantity(name, Some(index), &|r| r.values.get(at).copied()));
+        let first = out.len();
+        for name in column.elements() {
+            let mut q = quantity(name, Some(index), &|r| r.values.get(at).copied());
+            if !column.levels.is_empty() {
+                q.frequent = Frequent::of(q.chains.iter().flatten(), &column.levels);
+                q.levels.clone_from(&column.levels);
+            }
+            out.push(q);
             at += 1;
         }
+        let noise = out[first..].iter().map(|q| q.noise).fold(0.0, f64::max);
+        out[first..].iter_mut().for_each(|q| q.noise = noise);
     }
     out
 }
@@ -240,6 +281,33 @@ mod tests {
         let both = quantities(&[chain(vec![row(1.0, 1.0)]), other]);
         assert_eq!(both.iter().map(|q| &*q.name).collect::<Vec<_>>(), ["log_joint", "b"]);
         assert_eq!(both[0].chains, [[1.0], [3.0]]);
+    }
+
+    #[test]
+    fn arrays_texts_and_constants_are_shown_as_they_are() {
+        let columns = vec![
+            Column::new("R", Shape::Array(vec![2, 2])),
+            Column { levels: vec!["cup".into(), "vase".into()], ..Column::scalar("kind") },
+            Column::scalar("tiny"),
+        ];
+        let row = |i: u64| {
+            let kind = if i == 0 { f64::NAN } else { 1.0 };
+            DrawRow { values: vec![1.0, 2e-17, -0.0, 0.1, kind, 2e-17], ..DrawRow::default() }
+        };
+        let draws = |from: u64| ChainDraws {
+            columns: columns.clone(),
+            rows: (from..from + 1000).map(row).collect(),
+            ..Default::default()
+        };
+        let q = quantities(&[draws(1), draws(1)]);
+        let names: Vec<&str> = q[1..].iter().map(|q| &*q.name).collect();
+        assert_eq!(names, ["R[0,0]", "R[0,1]", "R[1,0]", "R[1,1]", "kind", "tiny"]);
+        let means = q[1..5].iter().map(|q| q.number(q.summary.mean));
+        assert_eq!(means.collect::<Vec<_>>(), ["1", "0", "0", "0.1"]);
+        assert!(q[1..5].iter().all(|q| q.summary.sd == 0.0 && q.number(q.summary.sd) == "0"));
+        assert_eq!(q[6].number(q[6].summary.mean), "2.00e-17", "it is small by itself");
+        assert_eq!(q[5].frequent.as_ref().map(ToString::to_string), Some("vase (100%)".into()));
+        assert_eq!(quantities(&[draws(0)])[5].frequent, None, "missing from a draw");
     }
 
     #[test]

@@ -1,11 +1,14 @@
 //! The results of a run in the groups of ArviZ's format: `posterior`, `sample_stats`,
 //! `log_likelihood` and `observed_data`.
 //!
-//! A vector has a dimension `NAME_dim_0`; observed values have one dimension `observation`,
-//! with their names as its coordinate. `/` in names becomes `.`, as in programs.
+//! An array has dimensions `NAME_dim_0`, `NAME_dim_1`, …. A record whose fields have one shape
+//! is an array with a dimension `NAME_field`, whose coordinate is the names of the fields; the
+//! fields of others are arrays of their own. Texts are numbers of categories, counted from 0, of
+//! which the coordinate `NAME_level` is the list. Observed values have one dimension
+//! `observation`, with their names as its coordinate. `/` in names becomes `.`, as in programs.
 
 use super::ChainDraws;
-use pcadlang_inference::draws::{Column, DrawRow, POINTWISE, Shape};
+use pcadlang_inference::draws::{Column, DrawRow, POINTWISE};
 use std::collections::HashSet;
 
 /// The name of an observed value, and the value; NaN if it is not a number.
@@ -77,7 +80,8 @@ pub fn groups(chains: &[ChainDraws], step_sizes: &[Option<f64>], points: &[Point
     let rows: Vec<&DrawRow> = chains.iter().flat_map(|c| &c.rows[..draws]).collect();
     let dims = vec![("chain".to_owned(), chains.len()), ("draw".to_owned(), draws)];
     let columns = chains.first().map_or(&[][..], |c| &c.columns);
-    let mut all = vec![Group::counted("posterior", posterior(columns, &rows, &dims))];
+    let (arrays, names) = posterior(columns, &rows, &dims);
+    let mut all = vec![names.iter().fold(Group::counted("posterior", arrays), Group::with)];
     let mut stats = sample_stats(&rows, &dims);
     if step_sizes.iter().any(Option::is_some) {
         let each =
@@ -113,23 +117,71 @@ fn place_of(columns: &[Column], name: &str) -> Option<(usize, usize)> {
     Some((columns[..before].iter().map(|c| c.shape.len()).sum(), columns[before].shape.len()))
 }
 
-fn posterior(columns: &[Column], rows: &[&DrawRow], dims: &[(String, usize)]) -> Vec<Array> {
-    let (mut at, mut taken, mut all) = (0, HashSet::new(), Vec::new());
-    for c in columns {
-        let (begin, n) = (at, c.shape.len());
-        at += n;
+/// The arrays of the recorded quantities, and the coordinates that do not count.
+fn posterior(
+    columns: &[Column],
+    rows: &[&DrawRow],
+    dims: &[(String, usize)],
+) -> (Vec<Array>, Vec<Array>) {
+    let (mut taken, mut arrays, mut names) = (HashSet::new(), Vec::new(), Vec::new());
+    let (mut begin, mut rest) = (0, columns);
+    while let Some(c) = rest.first() {
+        let fields = record_at(columns, rest);
+        let own = &rest[..fields.max(1)];
+        rest = &rest[own.len()..];
+        let (first, n) = (begin, c.shape.len());
+        begin += n * own.len();
         if c.name == POINTWISE || n == 0 {
             continue;
         }
-        let name = name_of(&c.name, &mut taken);
-        let mut dims = dims.to_vec();
-        if let Shape::Vector(n) = c.shape {
-            dims.push((format!("{name}_dim_0"), n));
+        let whole = if fields > 0 { c.name.rsplit_once('/').map_or("", |p| p.0) } else { &c.name };
+        let name = name_of(whole, &mut taken);
+        let sizes = c.shape.dims().iter().enumerate();
+        let mut dims: Vec<(String, usize)> =
+            dims.iter().cloned().chain(sizes.map(|(i, n)| (format!("{name}_dim_{i}"), *n))).collect();
+        if fields > 0 {
+            let field = |c: &Column| c.name.rsplit('/').next().unwrap_or_default().to_owned();
+            let texts = own.iter().map(field).collect();
+            let coordinate = coordinate(&format!("{name}_field"), texts);
+            dims.extend(coordinate.dims.clone());
+            names.push(coordinate);
         }
-        let numbers = rows.iter().flat_map(|r| r.values[begin..begin + n].to_vec()).collect();
-        all.push(Array { name, dims, numbers: Numbers::Floats(numbers) });
+        let value = |r: &DrawRow, i: usize| r.values[first + i % own.len() * n + i / own.len()];
+        let all = rows.iter().flat_map(|r| (0..n * own.len()).map(|i| value(r, i)));
+        let numbers = match c.levels.is_empty() {
+            true => Numbers::Floats(all.collect()),
+            false => {
+                names.push(coordinate(&format!("{name}_level"), c.levels.clone()));
+                let all: Vec<f64> = all.collect();
+                match all.iter().any(|x| x.is_nan()) {
+                    true => Numbers::Floats(all),
+                    false => Numbers::Integers(all.iter().map(|x| *x as i64).collect()),
+                }
+            }
+        };
+        arrays.push(Array { name, dims, numbers });
     }
-    all
+    (arrays, names)
+}
+
+/// A coordinate of texts.
+fn coordinate(name: &str, texts: Vec<String>) -> Array {
+    let dims = vec![(name.to_owned(), texts.len())];
+    Array { name: name.into(), dims, numbers: Numbers::Texts(texts) }
+}
+
+/// The number of columns at the head of `rest` that are a whole record, whose fields are numbers
+/// or arrays of one shape; 0 if there is none.
+fn record_at(all: &[Column], rest: &[Column]) -> usize {
+    fn record(c: &Column) -> Option<&str> {
+        c.is_field.then(|| c.name.rsplit_once('/')).flatten().map(|(record, _)| record)
+    }
+    let Some(name) = rest.first().and_then(record) else { return 0 };
+    let own = rest.iter().take_while(|c| record(c) == Some(name)).count();
+    let inside = |c: &&Column| c.name.strip_prefix(name).is_some_and(|r| r.starts_with('/'));
+    let same = |c: &Column| c.shape == rest[0].shape && c.levels.is_empty();
+    let whole = all.iter().filter(inside).count() == own && rest[..own].iter().all(same);
+    if whole { own } else { 0 }
 }
 
 fn sample_stats(rows: &[&DrawRow], dims: &[(String, usize)]) -> Vec<Array> {

@@ -80,11 +80,12 @@ pub fn modes(quantities: &[Quantity], evidence: Option<&Evidence>) -> Vec<Mode> 
 }
 
 /// Returns the quantities on which chains may disagree, the worst first. Those that never
-/// moved have no R-hat, but may differ between chains.
+/// moved in any chain have no R-hat, but may differ between chains.
 fn apart(quantities: &[Quantity]) -> Vec<&Quantity> {
     let rank =
         |q: &Quantity| if q.summary.r_hat.is_nan() { f64::INFINITY } else { q.summary.r_hat };
-    let mut worst: Vec<&Quantity> = quantities.iter().filter(|q| rank(q) > DISAGREE).collect();
+    let disagree = |q: &&Quantity| rank(q) > DISAGREE && !q.is_constant();
+    let mut worst: Vec<&Quantity> = quantities.iter().filter(disagree).collect();
     worst.sort_by(|a, b| rank(b).total_cmp(&rank(a)));
     worst
 }
@@ -149,12 +150,12 @@ pub(super) fn modes_rows(modes: &[Mode], quantities: &[Quantity]) -> Vec<Vec<Str
     differ.truncate(SHOWN.1);
     let first = quantities.first().filter(|f| !differ.iter().any(|q| q.name == f.name));
     for q in first.into_iter().chain(differ) {
-        rows.push(match q.frequent {
+        rows.push(match &q.frequent {
             Some(all) => row(&q.name, all.to_string(), &|m| {
                 let own = m.chains.iter().filter_map(|c| q.chains.get(c.checked_sub(1)?));
-                Frequent::of(own.flatten()).map_or("-".into(), |f| f.to_string())
+                Frequent::of(own.flatten(), &q.levels).map_or("-".into(), |f| f.to_string())
             }),
-            None => row(&q.name, number(q.summary.mean), &|m| number(mean(q, m))),
+            None => row(&q.name, q.number(q.summary.mean), &|m| q.number(mean(q, m))),
         });
     }
     table::narrowed(rows)

@@ -61,9 +61,9 @@ fn summaries(quantities: &[Quantity], seconds: Option<f64>) -> String {
         }
         let s = &q.summary;
         // The number of a category means nothing as a number.
-        let [mean, sd, low, high] = match q.frequent {
+        let [mean, sd, low, high] = match &q.frequent {
             Some(f) => [f.to_string(), "-".into(), "-".into(), "-".into()],
-            None => [s.mean, s.sd, s.q05, s.q95].map(number),
+            None => [s.mean, s.sd, s.q05, s.q95].map(|x| q.number(x)),
         };
         let ess = if s.ess_bulk.is_nan() { "-".into() } else { format!("{:.0}", s.ess_bulk) };
         let cells = [q.name.clone(), mean, sd, low, high, ess];
@@ -176,11 +176,13 @@ pub fn number(x: f64) -> String {
         return if x > 0.0 { "inf" } else { "-inf" }.into();
     }
     let size = x.abs();
-    if size != 0.0 && !(1e-4..1e6).contains(&size) {
+    if size == 0.0 {
+        return "0".into();
+    }
+    if !(1e-4..1e6).contains(&size) {
         return format!("{x:.2e}");
     }
-    let digits =
-        if size == 0.0 { 0 } else { (3 - size.log10().floor() as i32).clamp(0, 6) as usize };
+    let digits = (3 - size.log10().floor() as i32).clamp(0, 6) as usize;
     let s = format!("{x:.digits$}");
     if s.contains('.') { s.trim_end_matches('0').trim_end_matches('.').to_owned() } else { s }
 }
@@ -260,13 +262,7 @@ drift(one(@**))          0         -       1  0.50 s
     #[test]
     fn long_names_are_cut_and_lines_fit() {
         let chains = vec![vec![-1.234_567e-7, 1.0e9, 3.0, 4.0]; 2];
-        let of = |name: String| Quantity {
-            name,
-            column: Some(0),
-            summary: pcadlang_inference::diagnostics::summary(&chains),
-            chains: chains.clone(),
-            frequent: None,
-        };
+        let of = |name: String| Quantity::new(&name, Some(0), chains.clone());
         let long = format!("{}/last[3]", "deep/".repeat(40));
         let text = quantities(&[of(long), of("é".repeat(200))], 0.5);
         assert!(text.lines().all(|l| l.chars().count() <= COLUMNS), "{text}");
@@ -283,6 +279,7 @@ drift(one(@**))          0         -       1  0.50 s
     fn four_digits_are_enough() {
         for (x, text) in [
             (0.0, "0"),
+            (-0.0, "0"),
             (1.0, "1"),
             (1.60042, "1.6"),
             (0.012345, "0.01235"),

@@ -3,9 +3,8 @@
 //! the Zarr library, by `arviz.from_zarr`. Its groups are `posterior`, `sample_stats`,
 //! `log_likelihood` and `observed_data`.
 //!
-//! Arrays have one chunk and no compression; numbers are 8 bytes, little-endian. A vector
-//! has a dimension `NAME_dim_0`; observed values have one dimension `observation`, with
-//! their names as its coordinate. `/` in names becomes `.`, as in programs.
+//! Arrays have one chunk and no compression; numbers are 8 bytes, little-endian. What they
+//! are named, and their dimensions, is in [`super::inference`].
 
 use super::ChainDraws;
 use super::inference::{Array, Group, Numbers, Point, groups};

@@ -27,6 +27,7 @@ use crate::reopening::seen;
 use crate::stream::Streamed;
 use crate::verdict::{Judgement, Verdict};
 use crate::watched::Watched;
+use pcadlang_engine::lang::plan::{Plan, Step, StepKind};
 use pcadlang_inference::RunOptions;
 use pcadlang_inference::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang_inference::{Callback, Callbacks, ChainResult, Evidence, KeptTraces, Trajectory};
@@ -87,7 +88,7 @@ pub fn summaries(quantities: &[Quantity], seconds: f64) -> Map<String, Value> {
         if let Some(reason) = q.why_no_r_hat() {
             s["r_hat_reason"] = json!(reason);
         }
-        if let Some(frequent) = q.frequent {
+        if let Some(frequent) = &q.frequent {
             s["most_frequent"] = json!(frequent);
         }
         s["ess_per_second"] = json!(table::per_second(q.summary.ess_bulk, seconds));
@@ -461,6 +462,34 @@ fn approximate(job: &Job, chains: &[ChainResult]) -> Vec<String> {
     all
 }
 
+/// The sampler of a plan in CmdStan's words: its own where it is one of Stan's, else the names of
+/// the kernels that make draws.
+fn sampler(plan: &Plan) -> Vec<(&'static str, String)> {
+    fn gather<'a>(steps: &'a [Step], all: &mut Vec<&'a str>) {
+        for step in steps.iter().filter(|s| !matches!(s.kind, StepKind::Warmup(..))) {
+            all.extend(step.calls().filter_map(|c| c.text.split('(').next()));
+            gather(step.body(), all);
+        }
+    }
+    let mut kernels = Vec::new();
+    gather(&plan.steps, &mut kernels);
+    kernels.sort_unstable();
+    kernels.dedup();
+    let names = kernels.join("+");
+    let engine = match names.as_str() {
+        "nuts" => "nuts",
+        "hmc" => "static",
+        // rstan prints `sampler_t`; the name must not be missing.
+        _ => {
+            let names = if names.is_empty() { "none".into() } else { names };
+            return vec![("algorithm", names.clone()), ("sampler_t", names)];
+        }
+    };
+    [("algorithm", "hmc"), ("engine", engine), ("metric", "diag_e")]
+        .map(|(key, value)| (key, value.to_owned()))
+        .to_vec()
+}
+
 /// Returns sinks for each chain: its files, and its draws in memory for the summary.
 fn sinks(
     dir: &RunDir,
@@ -471,11 +500,12 @@ fn sinks(
     mode: &RunMode,
 ) -> Result<Vec<Box<dyn Sink>>, Failure> {
     let run = identity(record);
-    let comments = [
+    let mut comments = vec![
         ("program", job.inputs.program.clone()),
         ("program_hash", model.hash().to_owned()),
         ("seed", job.sampling.seed.to_string()),
     ];
+    comments.extend(sampler(&model.plan()?.0));
     let files = ChainFiles { dir, run: &run, comments: &comments };
     let mut sinks: Vec<Box<dyn Sink>> = Vec::new();
     for (i, memory) in memories.iter().enumerate() {

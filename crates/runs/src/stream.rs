@@ -1,7 +1,7 @@
 //! `run --stream`: each draw as a line of JSON, for programs in any language.
 
 use pcadlang_inference::Checkpoint;
-use pcadlang_inference::draws::{Column, DrawRow, POINTWISE, Shape, Sink};
+use pcadlang_inference::draws::{Column, DrawRow, POINTWISE, Sink};
 use serde_json::{Map, Number, Value, json};
 use std::io;
 
@@ -23,6 +23,18 @@ fn number(x: f64) -> Value {
     Number::from_f64(x).map_or(Value::Null, Value::Number)
 }
 
+/// An array of these dimensions, of texts if there are some.
+fn nested(own: &[f64], dims: &[usize], levels: &[String]) -> Value {
+    match dims {
+        [] if levels.is_empty() => own.first().map_or(Value::Null, |x| number(*x)),
+        [] => json!(own.first().filter(|x| **x >= 0.0).and_then(|x| levels.get(*x as usize))),
+        [n, inner @ ..] => {
+            let parts = own.chunks((own.len() / (*n).max(1)).max(1));
+            parts.map(|part| nested(part, inner, levels)).collect()
+        }
+    }
+}
+
 /// The line of a draw: chain and draw from 0, the log joint density, and the recorded values
 /// by name. Log densities of single observed values are left out.
 fn line(columns: &[Column], row: &DrawRow) -> Value {
@@ -33,11 +45,7 @@ fn line(columns: &[Column], row: &DrawRow) -> Value {
         if c.name == POINTWISE {
             continue;
         }
-        let value = match (c.shape, own) {
-            (Shape::Scalar, [x]) => number(*x),
-            _ => own.iter().map(|x| number(*x)).collect(),
-        };
-        values.insert(c.name.clone(), value);
+        values.insert(c.name.clone(), nested(own, c.shape.dims(), &c.levels));
     }
     json!({
         "chain": row.chain, "draw": row.draw, "log_joint": number(row.log_joint), "values": values,
@@ -75,13 +83,20 @@ impl<S: Sink> Sink for Streamed<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pcadlang_inference::draws::Shape;
 
     #[test]
     fn a_line_has_the_values_by_name() {
-        let columns = [Column::scalar("x"), Column::vector("w", 2), Column::vector(POINTWISE, 1)];
-        let values = vec![0.5, f64::NAN, 2.0, -3.0];
+        let columns = [
+            Column::scalar("x"),
+            Column::vector("w", 2),
+            Column::vector(POINTWISE, 1),
+            Column::new("m", Shape::Array(vec![2, 2])),
+            Column { levels: vec!["cup".into(), "vase".into()], ..Column::vector("kind", 2) },
+        ];
+        let values = vec![0.5, f64::NAN, 2.0, -3.0, 1.0, 2.0, 3.0, 4.0, 1.0, f64::NAN];
         let row = DrawRow { chain: 1, draw: 7, log_joint: -1.5, values, ..DrawRow::default() };
-        let wanted = r#"{"chain":1,"draw":7,"log_joint":-1.5,"values":{"x":0.5,"w":[null,2.0]}}"#;
+        let wanted = r#"{"chain":1,"draw":7,"log_joint":-1.5,"values":{"x":0.5,"w":[null,2.0],"m":[[1.0,2.0],[3.0,4.0]],"kind":["vase",null]}}"#;
         assert_eq!(line(&columns, &row).to_string(), wanted);
     }
 }

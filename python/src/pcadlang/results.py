@@ -24,7 +24,7 @@ def to_arviz(posterior: Grouped) -> Any:
     `observed_data`: those that the command writes as `inference.zarr`.
 
     Returns:
-        An `arviz.InferenceData`; with ArviZ 1 and later, an `xarray.DataTree`.
+        An `xarray.DataTree`; with ArviZ before 1.0, an `arviz.InferenceData`.
 
     Raises:
         ImportError: if ArviZ is not installed (`pip install pcadlang[arviz]`).
@@ -40,7 +40,8 @@ def to_arviz(posterior: Grouped) -> Any:
         coordinates = {n: v for n, (dims, v) in arrays.items() if dims == [n]}
         variables = {n: (dims, v) for n, (dims, v) in arrays.items() if n not in coordinates}
         groups[name] = xarray.Dataset(variables, coords=coordinates, attrs=about)
-    if hasattr(arviz, "InferenceData"):
+    # ArviZ 1 has the old name too: it stands for the tree, which is made another way.
+    if arviz.__version__.startswith("0."):
         return arviz.InferenceData(**groups)
     return xarray.DataTree.from_dict(groups)
 

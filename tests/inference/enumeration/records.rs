@@ -7,7 +7,7 @@ use super::execute::{Extent, Integration};
 use super::posterior::Posterior;
 use super::program::Program;
 use super::verdict::{Counts, Pooled};
-use pcadlang_inference::draws::Shape;
+use pcadlang_inference::draws::Column;
 use pcadlang_report::ChainDraws;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -95,10 +95,7 @@ impl Records {
 
 /// Returns the index of a choice's records among the values of a row.
 fn column(draws: &ChainDraws, address: &str) -> Result<usize, String> {
-    let names = draws.columns.iter().flat_map(|c| match c.shape {
-        Shape::Scalar => vec![c.name.clone()],
-        Shape::Vector(n) => (0..n).map(|i| format!("{}[{i}]", c.name)).collect(),
-    });
-    let at = names.into_iter().position(|n| n == address[1..]);
+    let mut names = draws.columns.iter().flat_map(Column::elements);
+    let at = names.position(|n| n == address[1..]);
     at.ok_or_else(|| format!("{address} is not recorded"))
 }

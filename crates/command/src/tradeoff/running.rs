@@ -1,7 +1,7 @@
 //! Moments of recorded quantities, available while a chain runs.
 
 use indexmap::IndexMap;
-use pcadlang_inference::draws::{Column, DrawRow, Shape, Sink};
+use pcadlang_inference::draws::{Column, DrawRow, Sink};
 use pcadlang_workbench::score::Normal;
 use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -29,12 +29,8 @@ impl Running {
 
 impl Sink for Running {
     fn columns(&mut self, columns: &[Column]) -> io::Result<()> {
-        let names = |c: &Column| match c.shape {
-            Shape::Scalar => vec![c.name.clone()],
-            Shape::Vector(n) => (0..n).map(|i| format!("{}[{i}]", c.name)).collect(),
-        };
         self.0.lock().unwrap_or_else(PoisonError::into_inner).names =
-            columns.iter().flat_map(names).collect();
+            columns.iter().flat_map(Column::elements).collect();
         Ok(())
     }
 

@@ -50,8 +50,14 @@ pub fn summary<C: AsRef<[f64]>>(chains: &[C]) -> Summary {
     let defined = |x: f64| if nan { f64::NAN } else { x };
     let unit = unit(&all);
     let scaled: Vec<f64> = all.iter().map(|x| x / unit).collect();
-    let (m, sd) = (unit * mean(&scaled), unit * variance(&scaled).sqrt());
+    let (mut m, mut sd) = (unit * mean(&scaled), unit * variance(&scaled).sqrt());
     all.sort_by(f64::total_cmp);
+    // Rounding would make a mean of equal numbers another number.
+    if let [first, .., last] = all[..]
+        && first == last
+    {
+        (m, sd) = (first, 0.0);
+    }
     let valid = Chains::new(chains);
     let of = |f: fn(&Chains) -> f64| valid.as_ref().map_or(f64::NAN, f);
     Summary {
@@ -92,6 +98,15 @@ mod tests {
         assert!(text.contains("\"r_hat\":null"), "{text}");
         let back: Summary = serde_json::from_str(&text).unwrap();
         assert_eq!(format!("{s:?}"), format!("{back:?}"));
+    }
+
+    #[test]
+    fn a_constant_is_its_mean() {
+        let s = summary(&[vec![0.1; 999], vec![0.1; 999]]);
+        assert_eq!((s.mean, s.sd), (0.1, 0.0));
+        let s = summary(&[[0.0, -0.0, 0.0, -0.0]]);
+        assert_eq!((s.mean, s.sd), (0.0, 0.0));
+        assert!(summary(&[[f64::NAN; 4]]).mean.is_nan());
     }
 
     #[test]

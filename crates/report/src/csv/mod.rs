@@ -1,29 +1,36 @@
-//! Draws of one chain as CSV in CmdStan's format, which ArviZ (`from_cmdstan`), posterior
-//! and CmdStan's tools can read.
+//! Draws of one chain as CSV in CmdStan's format, which `cmdstanpy.from_csv`,
+//! `rstan::read_stan_csv`, cmdstanr and ArviZ 0.x (`from_cmdstan`) can read.
 //!
 //! A file has comment lines (`# key = value`), a line of column names, and a line per
 //! draw. When a draw has new columns, the line of names is repeated with them; at the end
 //! of a run, all chains are brought to the same columns. Columns that end in `__` are
 //! about the draw: `lp__` (log joint density), `accept_stat__` (acceptance rate since the
 //! last draw), `divergent__` (divergent trajectories since the last draw), `log_prior__`,
-//! `log_likelihood__`, `step__`. The recorded quantities follow, with the elements of a
-//! vector as `name.1, name.2, …`. Numbers are written so that reading them gives the same
-//! bits.
+//! `log_likelihood__`, `step__`. The recorded quantities follow, with the elements of an
+//! array as `name.1, name.2, …`, of two dimensions as `name.1.1, name.2.1, …`. Texts are
+//! numbers of categories, counted from 0; a comment before the line of names lists them
+//! (`# levels of kind: ["cup", "vase"]`, in JSON without `=`). Numbers are written so that
+//! reading them gives the same bits.
+//!
+//! `num_samples` and `num_warmup` are known when a run ends ([`with_counts`]) and 0 until then.
 //!
 //! Invariant: the file is readable at any moment, because every line is passed to the
 //! system in one call and the reader leaves out an incomplete last line.
 
+mod names;
 mod read;
 
+pub(crate) use names::as_written;
+pub use names::column_names;
 pub(crate) use read::Contents;
 pub use read::{CsvError, DrawReader, read};
 
-use pcadlang_inference::draws::{Column, DrawRow, Shape, Sink, width};
-use std::collections::HashSet;
+use pcadlang_inference::draws::{Column, DrawRow, Sink, width};
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
+use std::time::Instant;
 
 /// The columns about the draw itself, which come first.
 pub(crate) const DRAW_COLUMNS: [&str; 6] =
@@ -36,6 +43,11 @@ pub struct CsvSink<W = File> {
     comments: String,
     /// The number of numbers in a row; `None` before the columns are known.
     width: Option<usize>,
+    /// The order in which they are written, if it is another.
+    order: Option<Vec<usize>>,
+    begun: Instant,
+    /// The time to the first draw, in seconds.
+    warm: f64,
     line: String,
     /// The number of bytes written so far.
     written: u64,
@@ -54,13 +66,8 @@ impl CsvSink {
     /// Continues a file that ends after the first `written` bytes of a chain. `columns`
     /// are the columns declared so far, if any.
     pub(crate) fn resume(file: File, written: u64, columns: Option<&[Column]>) -> Self {
-        CsvSink {
-            out: file,
-            comments: String::new(),
-            width: columns.map(width),
-            line: String::new(),
-            written,
-        }
+        let order = columns.and_then(names::file_order);
+        CsvSink { width: columns.map(width), order, written, ..CsvSink::bare(file) }
     }
 
     /// Flushes all draws to the disk.
@@ -78,27 +85,45 @@ impl<W: Write> CsvSink<W> {
     /// # Errors
     /// Returns an error if the writer fails.
     pub fn new(mut out: W, chain: u32, comments: &[(&str, String)]) -> io::Result<Self> {
-        let mut text =
-            format!("# model = pcadlang\n# id = {}\n# save_warmup = 0\n", u64::from(chain) + 1);
+        let mut text = format!(
+            "# model = pcadlang\n# method = sample\n# pcadlang_version = {}\n# id = {}\n",
+            env!("CARGO_PKG_VERSION"),
+            u64::from(chain) + 1
+        );
         for (key, value) in comments {
             let value = value.replace(|c: char| c.is_control(), " ");
             let _ = writeln!(text, "# {key} = {value}");
         }
+        // R finds these by their words, of which the last place counts.
+        for count in COUNTS {
+            text += &counted(count, 0);
+        }
+        text += "# save_warmup = 0\n# thin = 1\n";
         out.write_all(text.as_bytes())?;
         let written = text.len() as u64;
-        Ok(CsvSink { out, comments: text, width: None, line: String::new(), written })
+        Ok(CsvSink { comments: text, written, ..CsvSink::bare(out) })
     }
 
     /// Creates a sink whose output begins with the line of names.
     pub(crate) fn bare(out: W) -> Self {
-        CsvSink { out, comments: String::new(), width: None, line: String::new(), written: 0 }
+        CsvSink {
+            out,
+            comments: String::new(),
+            width: None,
+            order: None,
+            begun: Instant::now(),
+            warm: 0.0,
+            line: String::new(),
+            written: 0,
+        }
     }
 
-    /// Flushes the writer.
+    /// Writes comments after the draws, and flushes the writer.
     ///
     /// # Errors
     /// Returns an error if the output cannot be written.
-    pub(crate) fn flush(&mut self) -> io::Result<()> {
+    pub(crate) fn end(&mut self, comments: &str) -> io::Result<()> {
+        self.out.write_all(comments.as_bytes())?;
         self.out.flush()
     }
 
@@ -117,8 +142,16 @@ impl<W: Write> CsvSink<W> {
 impl<W: Write + Send> Sink for CsvSink<W> {
     fn columns(&mut self, columns: &[Column]) -> io::Result<()> {
         let names = DRAW_COLUMNS.map(String::from).into_iter().chain(column_names(columns));
-        let line = names.collect::<Vec<_>>().join(",") + "\n";
-        self.width = Some(width(columns));
+        let mut line = String::new();
+        for c in as_written(columns).iter().filter(|c| !c.levels.is_empty()) {
+            line += &levels_of(c);
+        }
+        line += &names.collect::<Vec<_>>().join(",");
+        line.push('\n');
+        if self.width.is_none() {
+            self.warm = self.begun.elapsed().as_secs_f64();
+        }
+        (self.width, self.order) = (Some(width(columns)), names::file_order(columns));
         self.written += line.len() as u64;
         self.out.write_all(line.as_bytes())
     }
@@ -136,7 +169,10 @@ impl<W: Write + Send> Sink for CsvSink<W> {
         let r = row;
         let _ = write!(self.line, "{:?},{:?},{}", r.log_joint, r.acceptance, r.divergent);
         let _ = write!(self.line, ",{:?},{:?},{}", r.log_prior, r.log_likelihood, r.step);
-        for x in &row.values {
+        let places = self.order.iter().flatten().copied();
+        let other = places.filter_map(|i| row.values.get(i));
+        let same = row.values.iter().filter(|_| self.order.is_none());
+        for x in same.chain(other) {
             let _ = write!(self.line, ",{x:?}");
         }
         self.line.push('\n');
@@ -145,86 +181,55 @@ impl<W: Write + Send> Sink for CsvSink<W> {
     }
 
     fn chain_done(&mut self, _chain: u32, steps: u64, warmup: u64, seconds: f64) -> io::Result<()> {
+        let warm = self.warm.min(seconds);
+        let rest = seconds - warm;
         let text = format!(
-            "# steps = {steps}\n# warmup_steps = {warmup}\n# Elapsed Time: {seconds:.3} seconds (Total)\n"
+            "# steps = {steps}\n# warmup_steps = {warmup}\n# \n#  Elapsed Time: {warm:.3} seconds (Warm-up)\n\
+             #                {rest:.3} seconds (Sampling)\n#                {seconds:.3} seconds (Total)\n# \n"
         );
         self.out.write_all(text.as_bytes())?;
         self.out.flush()
     }
 }
 
-/// Returns the name of every column of the file, with the elements of vectors one by one.
-///
-/// In ArviZ a `.` starts an index and a trailing `__` marks a statistic of the sampler,
-/// and neither ArviZ nor CmdStan supports quotes. Therefore `.` becomes `/`, a comma `;`,
-/// white space and quotes `_`, and a name that ends in `__` gets a trailing `/`. Names
-/// that become equal get the suffixes `/2`, `/3`, ….
-pub fn column_names(columns: &[Column]) -> Vec<String> {
-    let mut taken = HashSet::new();
-    let mut names = Vec::new();
-    for column in columns {
-        let wanted = csv_safe(&column.name);
-        let mut name = wanted.clone();
-        let mut copies = 1;
-        while !taken.insert(name.clone()) {
-            copies += 1;
-            name = format!("{wanted}/{copies}");
-        }
-        match column.shape {
-            Shape::Scalar => names.push(name),
-            Shape::Vector(n) => names.extend((1..=n).map(|i| format!("{name}.{i}"))),
-        }
-    }
-    names
+/// The counts at the head of a file that are known at the end of the run.
+const COUNTS: [&str; 2] = ["num_warmup", "num_samples"];
+
+/// The line of a count, equally long for all counts.
+fn counted(key: &str, n: u64) -> String {
+    format!("# {key} = {n:<20}\n")
 }
 
-fn csv_safe(name: &str) -> String {
-    let mut out: String = name
-        .chars()
-        .map(|c| match c {
-            '.' => '/',
-            ',' => ';',
-            c if c.is_whitespace() || c.is_control() || c == '"' => '_',
-            c => c,
-        })
-        .collect();
-    if out.is_empty() || out.starts_with('#') {
-        out.insert(0, '_');
-    }
-    if out.ends_with("__") {
-        out.push('/');
-    }
-    out
-}
-
-/// Returns these columns under the names that they have in a file.
-pub(crate) fn as_written(wanted: &[Column]) -> Vec<Column> {
-    columns(&column_names(wanted).iter().map(String::as_str).collect::<Vec<_>>())
-}
-
-/// Returns the columns of a line of names: the inverse of [`column_names`] for names that
-/// it did not change.
-pub(super) fn columns(names: &[&str]) -> Vec<Column> {
-    let mut columns: Vec<Column> = Vec::new();
-    for name in names {
-        let element =
-            name.rsplit_once('.').and_then(|(base, i)| Some((base, i.parse::<usize>().ok()?)));
-        match (element, columns.last_mut()) {
-            (Some((base, i)), Some(Column { name, shape: Shape::Vector(n) }))
-                if name == base && i == *n + 1 =>
-            {
-                *n = i
-            }
-            (Some((base, 1)), _) => columns.push(Column::vector(base, 1)),
-            _ => columns.push(Column::scalar(*name)),
+/// Returns the comments at the head of a file with the number of steps of the warm-up and of
+/// draws; the length stays the same. Comments of older versions, without counts, stay as they
+/// are.
+pub(crate) fn with_counts(head: &str, warmup: u64, draws: u64) -> String {
+    let line = |line: &str| {
+        let key = line.strip_prefix("# ").and_then(|l| l.split_once(" = ")).map(|(key, _)| key);
+        match COUNTS.iter().position(|count| Some(*count) == key) {
+            Some(i) => counted(COUNTS[i], [warmup, draws][i]),
+            None => format!("{line}\n"),
         }
-    }
-    columns
+    };
+    head.lines().map(line).collect()
+}
+
+/// The comment with the texts of a column.
+fn levels_of(c: &Column) -> String {
+    let json = serde_json::json!(c.levels).to_string().replace('=', "\\u003d");
+    format!("# levels of {}: {json}\n", c.name)
+}
+
+/// The name and the texts in such a comment, without its `#`.
+fn levels_in(comment: &str) -> Option<(&str, Vec<String>)> {
+    let (name, json) = comment.strip_prefix(" levels of ")?.split_once(": ")?;
+    Some((name, serde_json::from_str(json).ok()?))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pcadlang_inference::draws::Shape;
     use std::sync::{Arc, Mutex};
 
     /// Records the total length after every call to `write`.
@@ -279,7 +284,7 @@ mod tests {
         let mut sink =
             CsvSink::new(shared.clone(), 2, &[("seed", "7".into()), ("program", "a\nb".into())])
                 .unwrap();
-        let columns = [Column::vector("v", 7), Column::scalar("a/b")];
+        let columns = [Column::vector("v", 7), Column::scalar("a_b")];
         sink.columns(&columns).unwrap();
         for draw in 0..5 {
             sink.draw(&row(draw, ODD.to_vec())).unwrap();
@@ -321,26 +326,40 @@ mod tests {
     }
 
     #[test]
-    fn names_survive_the_way_there_and_back() {
-        let wanted = [
-            Column::scalar("a/b"),
-            Column::vector("v", 3),
-            Column::vector("w", 1),
-            Column::scalar("f(x;y)"),
+    fn arrays_and_texts_come_back() {
+        let texts = ["a = b, \"c\"\n", "vase"].map(str::to_owned).to_vec();
+        let columns = [
+            Column::new("R", Shape::Array(vec![2, 3])),
+            Column { levels: texts, ..Column::scalar("kind") },
         ];
-        let names = column_names(&wanted);
-        assert_eq!(names, ["a/b", "v.1", "v.2", "v.3", "w.1", "f(x;y)"]);
-        assert_eq!(columns(&names.iter().map(String::as_str).collect::<Vec<_>>()), wanted);
+        let shared = Shared::default();
+        let mut sink = CsvSink::new(shared.clone(), 0, &[]).unwrap();
+        sink.columns(&columns).unwrap();
+        let values = vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 1.0];
+        sink.draw(&row(0, values.clone())).unwrap();
+        sink.chain_done(0, 1, 0, 0.5).unwrap();
+        let bytes = shared.0.lock().unwrap().0.clone();
+        let text = std::str::from_utf8(&bytes).unwrap();
+        assert!(text.contains(",R.1.1,R.2.1,R.1.2,R.2.2,R.1.3,R.2.3,kind\n"));
+        assert!(text.contains(",1.0,4.0,2.0,5.0,3.0,6.0,1.0\n"), "the first index changes first");
+        assert!(text.contains("# levels of kind: [\"a \\u003d b, \\\"c\\\"\\n\",\"vase\"]\n"));
+        let chain = read(text).unwrap();
+        assert_eq!((&chain.columns[..], &chain.rows[0].values), (&columns[..], &values));
     }
 
     #[test]
-    fn what_would_break_a_reader_is_replaced() {
-        let odd = ["a.b", "f(x, y)", "# c", "", "lp__", "a/b", "q\"\n"].map(Column::scalar);
-        assert_eq!(column_names(&odd), ["a/b", "f(x;_y)", "_#_c", "_", "lp__/", "a/b/2", "q__/"]);
-    }
-
-    #[test]
-    fn empty_vectors_have_no_columns() {
-        assert_eq!(column_names(&[Column::vector("v", 0), Column::scalar("x")]), ["x"]);
+    fn counts_are_filled_in_without_moving_anything() {
+        let mut sink = CsvSink::new(Vec::new(), 0, &[("program", "num_samples = 7".into())]).unwrap();
+        sink.columns(&[]).unwrap();
+        let head = sink.comments().to_owned();
+        let filled = with_counts(&head, 12, 345);
+        assert_eq!(filled.len(), head.len());
+        let line = |key: &str| {
+            filled.lines().find(|l| l.starts_with(&format!("# {key} ="))).map(str::trim_end)
+        };
+        assert_eq!(line("num_samples"), Some("# num_samples = 345"));
+        assert_eq!(line("num_warmup"), Some("# num_warmup = 12"));
+        assert_eq!(line("program"), Some("# program = num_samples = 7"));
+        assert_eq!(with_counts("# id = 1\n", 1, 2), "# id = 1\n", "an older file");
     }
 }

@@ -1,16 +1,22 @@
 //! Reads draws from CSV: line by line, draw by draw, or a whole file.
 
-use super::{DRAW_COLUMNS, columns};
+use super::names::{columns, file_order};
+use super::{DRAW_COLUMNS, levels_in};
 use crate::ChainDraws;
 use pcadlang_inference::draws::{Column, DrawRow, Layout, merged, width};
+use std::collections::HashMap;
 use std::io::{self, BufRead, Take};
 use thiserror::Error;
 
 /// The contents of a file of draws, apart from its numbers.
 #[derive(Default)]
 pub(crate) struct Contents {
-    /// The lines of comments.
-    pub comments: String,
+    /// The comments before the first line of names.
+    pub head: String,
+    /// The comments after it, without levels.
+    pub tail: String,
+    /// The length of all that precedes the first line of names, in bytes.
+    pub head_end: u64,
     /// The union of the columns of its draws.
     pub columns: Vec<Column>,
     /// The number of lines of names.
@@ -27,10 +33,17 @@ impl Contents {
     pub fn of(from: impl BufRead) -> Result<Contents, CsvError> {
         let mut found = Contents::default();
         let mut lines = Lines::new(from, u64::MAX);
-        while let Some(line) = lines.next_line()? {
+        loop {
+            let begin = lines.position;
+            let Some(line) = lines.next_line()? else { break };
             match line {
-                Line::Comment(text) => found.comments += &format!("#{text}\n"),
+                Line::Comment(text) if found.heads == 0 => found.head += &format!("#{text}\n"),
+                Line::Comment(text) if levels_in(text).is_some() => {}
+                Line::Comment(text) => found.tail += &format!("#{text}\n"),
                 Line::Names(columns) => {
+                    if found.heads == 0 {
+                        found.head_end = begin;
+                    }
                     found.heads += 1;
                     found.columns = merged(&found.columns, &columns);
                 }
@@ -38,6 +51,17 @@ impl Contents {
             }
         }
         Ok(found)
+    }
+
+    /// The comments before the first line of names, without levels.
+    pub fn settings(&self) -> String {
+        let others = self.head.lines().filter(|l| l.get(1..).and_then(levels_in).is_none());
+        others.flat_map(|l| [l, "\n"]).collect()
+    }
+
+    /// The steps of the warm-up, if the chain has ended.
+    pub fn warmup(&self) -> Option<u64> {
+        self.tail.lines().find_map(|l| l.strip_prefix("# warmup_steps = ")?.parse().ok())
     }
 }
 
@@ -47,7 +71,8 @@ impl Contents {
 /// # Errors
 /// Returns an error if a complete line is malformed.
 pub fn read(text: &str) -> Result<ChainDraws, CsvError> {
-    let Contents { comments, columns, .. } = Contents::of(text.as_bytes())?;
+    let found = Contents::of(text.as_bytes())?;
+    let (comments, columns) = (found.settings() + &found.tail, found.columns);
     let pair = |line: &str| {
         let (key, value) = line.strip_prefix('#')?.split_once('=')?;
         Some((key.trim().to_owned(), value.trim().to_owned()))
@@ -122,6 +147,7 @@ pub(super) struct Numbers<'a> {
     text: &'a str,
     line: usize,
     pub width: usize,
+    order: Option<&'a [usize]>,
 }
 
 /// Reads the complete lines in the first bytes of a file.
@@ -132,14 +158,25 @@ pub(super) struct Lines<R> {
     pub position: u64,
     /// The number of the lines read so far.
     pub count: usize,
-    /// The number of recorded numbers after the last line of names.
+    /// The number of recorded numbers after the last line of names, and their order.
     width: Option<usize>,
+    order: Option<Vec<usize>>,
+    /// The texts of columns so far.
+    levels: HashMap<String, Vec<String>>,
 }
 
 impl<R: BufRead> Lines<R> {
     /// Creates a reader; nothing at or after byte `end` is read.
     pub fn new(from: R, end: u64) -> Self {
-        Lines { from: from.take(end), text: String::new(), position: 0, count: 0, width: None }
+        Lines {
+            from: from.take(end),
+            text: String::new(),
+            position: 0,
+            count: 0,
+            width: None,
+            order: None,
+            levels: HashMap::new(),
+        }
     }
 
     /// Reads the next line; returns `None` at the end or at an incomplete line.
@@ -151,13 +188,19 @@ impl<R: BufRead> Lines<R> {
         self.count += 1;
         let (text, line) = (text.trim_end_matches('\r'), self.count);
         Ok(Some(if let Some(comment) = text.strip_prefix('#') {
+            if let Some((name, levels)) = levels_in(comment) {
+                self.levels.insert(name.to_owned(), levels);
+            }
             Line::Comment(comment)
-        } else if let Some(columns) = named(text) {
-            self.width = Some(width(&columns));
+        } else if let Some(mut columns) = named(text) {
+            for c in &mut columns {
+                c.levels = self.levels.get(&c.name).cloned().unwrap_or_default();
+            }
+            (self.width, self.order) = (Some(width(&columns)), file_order(&columns));
             Line::Names(columns)
         } else {
             let width = self.width.ok_or(CsvError::Columns { line })?;
-            Line::Draw(Numbers { text, line, width })
+            Line::Draw(Numbers { text, line, width, order: self.order.as_deref() })
         }))
     }
 }
@@ -181,6 +224,10 @@ impl Numbers<'_> {
             [log_joint, acceptance, divergent, log_prior, log_likelihood, step, values @ ..]
                 if values.len() == self.width =>
             {
+                let mut row = values.to_vec();
+                for (x, place) in values.iter().zip(self.order.unwrap_or_default()) {
+                    row[*place] = *x;
+                }
                 Ok(DrawRow {
                     chain: 0,
                     draw: 0,
@@ -190,7 +237,7 @@ impl Numbers<'_> {
                     log_likelihood: *log_likelihood,
                     acceptance: *acceptance,
                     divergent: *divergent as u64,
-                    values: values.to_vec(),
+                    values: row,
                 })
             }
             _ => {
@@ -292,7 +339,8 @@ mod tests {
         let text = format!("{HEAD}1,2,3,4,5,6,7,8,x\n{more}1\n# steps = 9\r\n1,2,3");
         let found = Contents::of(text.as_bytes()).unwrap();
         assert_eq!((found.draws, found.heads), (2, 2), "half a line is none");
-        assert_eq!(found.comments, "# id = 3\n# steps = 9\n");
+        assert_eq!((&*found.head, &*found.tail), ("# id = 3\n", "# steps = 9\n"));
+        assert_eq!(found.head_end, found.head.len() as u64);
         let names: Vec<&str> = found.columns.iter().map(|c| &*c.name).collect();
         assert_eq!(names, ["x", "v", "y"]);
     }

@@ -4,7 +4,7 @@
 use super::encode::{breakable, escaped};
 use super::pictures::source;
 use super::{PLOTTED, Page};
-use crate::{Quantity, number, r_hat_text, seconds};
+use crate::{Quantity, r_hat_text, seconds};
 use pcadlang_inference::draws::KernelStats;
 use std::fmt::Write;
 
@@ -29,11 +29,12 @@ pub(super) fn quantities(quantities: &[Quantity]) -> String {
             false => _ = write!(s, "<tr><th>{name}"),
         }
         let known = |x: f64| if q.frequent.is_some() { f64::NAN } else { x };
-        let mean = q.frequent.map_or_else(|| number(m.mean), |f| f.to_string());
-        let _ = write!(s, "<td>{mean}<td>{}<td{class}>{r_hat}", number(known(m.sd)));
+        let frequent = q.frequent.as_ref().map(|f| escaped(&f.to_string()));
+        let mean = frequent.unwrap_or_else(|| q.number(m.mean));
+        let _ = write!(s, "<td>{mean}<td>{}<td{class}>{r_hat}", q.number(known(m.sd)));
         let [low, median, high, error] = [m.q05, m.q50, m.q95, m.mcse_mean].map(known);
         for x in [low, median, high, m.ess_bulk.round(), m.ess_tail.round(), error] {
-            let _ = write!(s, "<td>{}", number(x));
+            let _ = write!(s, "<td>{}", q.number(x));
         }
         s.push_str("</tr>\n");
     }

@@ -162,7 +162,9 @@ fn quantities(compared: &Comparison) -> String {
         // The numbers of categories have no mean.
         let frequent = |summary: &Value| {
             let f = &summary["most_frequent"];
-            Some(Frequent { value: f["value"].as_f64()?, share: f["share"].as_f64()? }.to_string())
+            let text = f["text"].as_str().map(str::to_owned);
+            let (value, share) = (f["value"].as_f64()?, f["share"].as_f64()?);
+            Some(Frequent { value, text, share }.to_string())
         };
         let [left, right] = [a, b].map(|s| match frequent(s) {
             Some(frequent) => [frequent, "-".into()],

@@ -65,12 +65,28 @@ def joined(chains: Sequence[Groups]) -> Groups:
     """One set of groups from those of single chains."""
     all_groups: Groups = {}
     for group in dict.fromkeys(name for chain in chains for name in chain):
-        parts = [chain.get(group, {}) for chain in chains]
+        parts = recoded([chain.get(group, {}) for chain in chains])
         names = dict.fromkeys(name for part in parts for name in part)
         draws = [part["draw"][1].shape[0] for part in parts if "draw" in part]
         even = min(draws, default=0)
         all_groups[group] = {name: join(name, parts, even) for name in names}
     return all_groups
+
+
+def recoded(parts: Sequence[dict[str, Array]]) -> Sequence[dict[str, Array]]:
+    """The same arrays, where texts have the same numbers in all chains (`NAME_level` lists them)."""
+    parts = [dict(part) for part in parts]
+    for level in dict.fromkeys(n for part in parts for n in part if n.endswith("_level")):
+        own = [part[level][1].tolist() if level in part else [] for part in parts]
+        texts = list(dict.fromkeys(text for each in own for text in each))
+        for part, each in zip(parts, own, strict=True):
+            dims, codes = part.get(name := level.removesuffix("_level"), ([], np.empty(0)))
+            if level in part and dims[:1] == ["chain"]:
+                numbers = np.array([*map(texts.index, each), np.nan])
+                known = np.where(np.isnan(codes), len(each), codes).astype(int)
+                part[level] = [level], np.array(texts)
+                part[name] = dims, numbers[known].astype(codes.dtype)
+    return parts
 
 
 def join(name: str, parts: Sequence[dict[str, Array]], even: int) -> Array:
