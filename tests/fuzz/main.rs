@@ -296,8 +296,13 @@ fn accepts_its_seeds(name: &str, target: Target) {
         let good = match name {
             "obj" => obj::load(seed).is_ok(),
             // One of them has an external buffer.
-            "gltf" => load(seed, &FileFrame::default(), &|_| Err("beside".into()))
-                .map_or_else(|e| e.to_string().contains("beside"), |loaded| loaded.mesh().is_ok()),
+            "gltf" => {
+                load(seed, &FileFrame::default(), Default::default(), &|_| Err("beside".into()))
+                    .map_or_else(
+                        |e| e.to_string().contains("beside"),
+                        |loaded| loaded.mesh().is_ok(),
+                    )
+            }
             "image" => photo::decode(seed, &Limits::default()).is_ok(),
             "array" => depth::decode(seed, 1.0, 0.0, &Limits::default()).is_ok(),
             "camera" => Camera::from_json(text()).is_ok(),

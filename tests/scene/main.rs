@@ -9,4 +9,5 @@ mod armature;
 mod caches;
 mod drawing;
 mod gltf;
+mod gltf_shapes;
 mod keypoints;
