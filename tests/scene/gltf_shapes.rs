@@ -273,27 +273,44 @@ fn the_bind_pose_of_a_posed_body_does_not_lean_with_its_root() {
     }
     binds[1][13] = -1.0;
     let binds = w.floats("MAT4", &binds.concat());
-    let (small, large) = (f64::to_radians(5.0).sin_cos(), f64::to_radians(30.0).sin_cos());
-    let d = json!({
-        "scenes": [{ "nodes": [0, 1] }],
-        "nodes": [
-            { "mesh": 0, "skin": 0 },
-            { "name": "hip", "children": [2], "rotation": [0, 0, small.0, small.1] },
-            { "name": "knee", "translation": [0, 1, 0], "rotation": [0, 0, large.0, large.1] },
-        ],
-        "meshes": [{ "primitives": [{ "attributes": { "POSITION": at, "JOINTS_0": joints, "WEIGHTS_0": shares }, "indices": corners }] }],
-        "skins": [{ "joints": [1, 2], "inverseBindMatrices": binds }],
-    });
-    let file = glb(w, d);
-    let bind = read_in(&file, Pose::Bind).unwrap();
-    assert_eq!(size(&bind.positions), DVec3::new(f64::from(0.2f32), 2.0, 0.0));
-    let head = |all: Loaded, name: &str| {
-        let rig = all.rig.unwrap();
+    let d = |hip: Value, knee: f64| {
+        let (sin, cos) = f64::to_radians(knee / 2.0).sin_cos();
+        json!({
+            "scenes": [{ "nodes": [0, 1] }],
+            "nodes": [
+                { "mesh": 0, "skin": 0 }, hip,
+                { "name": "knee", "translation": [0, 1, 0], "rotation": [0, 0, sin, cos] },
+            ],
+            "meshes": [{ "primitives": [{ "attributes": { "POSITION": at, "JOINTS_0": joints, "WEIGHTS_0": shares }, "indices": corners }] }],
+            "skins": [{ "joints": [1, 2], "inverseBindMatrices": binds }],
+        })
+    };
+    let mut document = d(json!({}), 0.0);
+    let bytes = w.document(&mut document);
+    let mut file = |degrees: f64, up: f64, knee: f64| {
+        let (sin, cos) = f64::to_radians(degrees / 2.0).sin_cos();
+        let hip = json!({ "name": "hip", "children": [2], "rotation": [0, 0, sin, cos], "translation": [0, up, 0] });
+        document["nodes"] = d(hip, knee)["nodes"].clone();
+        packed(&document, &bytes)
+    };
+    let head = |all: &Loaded, name: &str| {
+        let rig = all.rig.as_ref().unwrap();
         rig.joints()[rig.find(name).unwrap()].head
     };
-    assert!((head(bind, "knee") - DVec3::Y).length() < 1e-6);
-    let (sin, cos) = f64::to_radians(10.0).sin_cos();
-    assert!((head(read(&file), "knee") - DVec3::new(-sin, cos, 0.0)).length() < 1e-6);
+    let upright = DVec3::new(f64::from(0.2f32), 2.0, 0.0);
+    for (degrees, up, knee) in [(10.0, 0.0, 60.0), (40.0, 1.0, 0.0), (0.0, 0.0, 60.0)] {
+        let file = file(degrees, up, knee);
+        let (bind, posed) = (read_in(&file, Pose::Bind).unwrap(), read(&file));
+        assert_eq!(size(&bind.positions), upright, "{degrees}, {up}, {knee}");
+        assert!((head(&bind, "knee") - DVec3::Y).length() < 1e-6);
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        assert!((head(&posed, "knee") - DVec3::new(-sin, cos + up, 0.0)).length() < 1e-6);
+        assert!(bind.remarks[0].contains("posed") && posed.remarks[0].contains("posed"));
+    }
+    // A root turned by a right angle exchanges axes.
+    let all = read_in(&file(90.0, 0.0, 0.0), Pose::Bind).unwrap();
+    assert!((size(&all.positions) - DVec3::new(2.0, upright.x, 0.0)).length() < 1e-6);
+    assert!(all.remarks.is_empty());
 }
 
 #[test]

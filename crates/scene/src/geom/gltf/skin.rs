@@ -92,10 +92,17 @@ fn agree(by_joint: &[DAffine3], with: DAffine3, heads: &[DVec3]) -> bool {
     by_joint.iter().all(near)
 }
 
-/// Returns the likely matrix from a posed skin's vertices to the scene that puts joints
-/// nearest to where the file has them, if it is of the size of that of the root joint, and puts
-/// them less than half of the skeleton away; otherwise that of the root joint.
-fn usual(likely: [DAffine3; 2], root: DAffine3, binds: &[DAffine3], heads: &[DVec3]) -> DAffine3 {
+/// Returns the matrix from a skin's vertices to the scene in the bind pose: that of the root
+/// joint, or where that is posed, the likely one that puts joints nearest to where the file has
+/// them. The root is posed if it is turned by other than right angles, by which exporters
+/// exchange axes, or if joints disagree and are less than half of the skeleton away.
+fn usual(
+    likely: [DAffine3; 3],
+    root: DAffine3,
+    agreed: bool,
+    binds: &[DAffine3],
+    heads: &[DVec3],
+) -> DAffine3 {
     let away = |m: &DAffine3| {
         let squares = binds.iter().zip(heads).map(|(b, head)| {
             (m.transform_point3(b.inverse().translation) - *head).length_squared()
@@ -104,11 +111,15 @@ fn usual(likely: [DAffine3; 2], root: DAffine3, binds: &[DAffine3], heads: &[DVe
     };
     let size = root.matrix3.determinant();
     let fits = |m: &DAffine3| (m.matrix3.determinant() / size - 1.0).abs() < 0.01;
+    let right_angles = |m: &DAffine3| {
+        let turn = (m.matrix3.inverse() * root.matrix3).to_cols_array();
+        turn.iter().all(|x| x.abs() < 1e-3 || (x.abs() - 1.0).abs() < 1e-3)
+    };
     let found = likely.into_iter().filter(fits).map(|m| (away(&m), m));
-    found
-        .filter(|(away, _)| *away < extent(heads) / 2.0)
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .map_or(root, |(_, m)| m)
+    match found.min_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((away, m)) if !right_angles(&m) || !agreed && away < extent(heads) / 2.0 => m,
+        _ => root,
+    }
 }
 
 impl Skeleton {
@@ -154,11 +165,12 @@ impl Skeleton {
             let heads: Vec<DVec3> =
                 skin.joints.iter().map(|j| nodes.global[*j].translation).collect();
             let mut to_scene = by_joint[first];
+            let parent = nodes.parents[skin.joints[first]];
+            let above = parent.map_or(DAffine3::IDENTITY, |p| nodes.global[p]);
+            let likely = [nodes.global[user], above, DAffine3::IDENTITY];
+            let agreed = agree(&by_joint, to_scene, &heads);
+            to_scene = usual(likely, to_scene, agreed, &binds, &heads);
             let still = agree(&by_joint, to_scene, &heads);
-            if !still {
-                let likely = [nodes.global[user], DAffine3::IDENTITY];
-                to_scene = usual(likely, to_scene, &binds, &heads);
-            }
             if to_scene.abs_diff_eq(DAffine3::IDENTITY, SAME) {
                 to_scene = DAffine3::IDENTITY;
             }
