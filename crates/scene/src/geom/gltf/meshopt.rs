@@ -95,7 +95,7 @@ fn attributes(bytes: &[u8], count: usize, stride: usize) -> Result<Vec<u8>, Stri
     let mut source = Source(body);
     let mut out = Vec::new();
     while out.len() < count * stride {
-        let elements = (count - out.len() / stride).min(8192 / stride & !15).min(256);
+        let elements = (count - out.len() / stride).min((8192 / stride) & !15).min(256);
         let control = if newer { source.take(channels)? } else { &[] };
         let start = out.len();
         let mut deltas = [[0; 256]; 4];

@@ -11,6 +11,9 @@ use std::collections::BTreeSet;
 /// The maximum number of offsets of all morphs together.
 pub(super) const MOST_OFFSETS: usize = 50_000_000;
 
+/// The maximum number of morphs, and of a mesh's targets.
+pub(super) const MOST_MORPHS: usize = 4096;
+
 /// A morph of a file's meshes, in scene units; meshes that have one of the same name and
 /// weight share it.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,8 +27,11 @@ pub struct LoadedMorph {
 }
 
 /// The names and weights of a mesh's targets, where a node draws it.
-pub(super) fn targets(node: &Node, mesh: &JsonMesh) -> Vec<(String, f64)> {
+pub(super) fn targets(node: &Node, mesh: &JsonMesh) -> Result<Vec<(String, f64)>, GeomError> {
     let count = mesh.primitives.iter().map(|p| p.targets.len()).max().unwrap_or_default();
+    if count > MOST_MORPHS {
+        return Err(too_many());
+    }
     let names = mesh.extras.as_ref().and_then(|x| x.get("targetNames"));
     let weights = node.weights.as_ref().or(mesh.weights.as_ref());
     let mut taken = BTreeSet::new();
@@ -40,7 +46,7 @@ pub(super) fn targets(node: &Node, mesh: &JsonMesh) -> Vec<(String, f64)> {
         }
         (name, weights.and_then(|all| all.get(k)).copied().unwrap_or_default())
     };
-    (0..count).map(&mut one).collect()
+    Ok((0..count).map(&mut one).collect())
 }
 
 /// Returns for each target of a primitive the vertices that it moves, with their offsets.
@@ -75,6 +81,6 @@ pub(super) fn offsets(
 
 pub(super) fn too_many() -> GeomError {
     GeomError::invalid(format!(
-        "the morph targets of the glTF file have more than {MOST_OFFSETS} offsets"
+        "the glTF file has more than {MOST_MORPHS} morph targets, or {MOST_OFFSETS} offsets in them"
     ))
 }

@@ -5,7 +5,7 @@ use super::access::{Data, F32, I8, I16, MOST_ELEMENTS, U8, U16, U32};
 use super::container::name_of;
 use super::draco::Contents;
 use super::json::{JsonMesh, Primitive};
-use super::morphs::{self, LoadedMorph, MOST_OFFSETS};
+use super::morphs::{self, LoadedMorph, MOST_MORPHS, MOST_OFFSETS};
 use super::nodes::Nodes;
 use super::skin::{Placed, Skeleton, influences};
 use super::{Loaded, Pose, Rig, instances};
@@ -43,7 +43,7 @@ pub(super) fn collect(
             Some(skin) => skin.to_scene,
             None => skeleton.place(data, nodes, i)?,
         };
-        let targets = morphs::targets(node, mesh);
+        let targets = morphs::targets(node, mesh)?;
         let shapes = shapes(data, mesh, &what, skin, &targets, out.loaded.rig.as_ref())?;
         let carrier = skeleton.carrier[i].and_then(|j| out.loaded.rig.as_ref()?.placed(j));
         let carried = carrier
@@ -70,11 +70,10 @@ pub(super) fn collect(
             out.part(before, called)?;
         }
     }
-    let mut out = out.loaded_and_apart(pose);
+    let out = out.finish(pose);
     if out.triangles.is_empty() {
         return Err(GeomError::invalid("the scene of the glTF file has no triangles"));
     }
-    out.morphs.retain(|m| !m.offsets.is_empty());
     Ok(out)
 }
 
@@ -155,12 +154,13 @@ fn triangles(
     let positions = contents.attribute("POSITION", "VEC3", &[F32, I8, U8, I16, U16])?;
     let Some(positions) = positions else { return Ok(None) };
     let count = positions.count;
-    let corners: Vec<u32> = match (contents.corners(), p.indices) {
-        (Some(corners), _) => corners,
-        (None, None) => (0..count as u32).collect(),
+    let (corners, mode): (Vec<u32>, u32) = match (contents.corners(), p.indices) {
+        // Draco gives a list of triangles, also of a strip.
+        (Some(corners), _) => (corners, 4),
+        (None, None) => ((0..count as u32).collect(), mode),
         (None, Some(i)) => {
             let e = data.elements(i, "SCALAR", &[U8, U16, U32])?;
-            (0..e.count).map(|i| e.whole(i, 0) as u32).collect()
+            ((0..e.count).map(|i| e.whole(i, 0) as u32).collect(), mode)
         }
     };
     if let Some(c) = corners.iter().find(|c| **c as usize >= count) {
@@ -168,10 +168,6 @@ fn triangles(
     }
     let faces: Vec<[u32; 3]> = match mode {
         4 => corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
-        // Draco gives a list of triangles, whatever the mode.
-        _ if contents.corners().is_some() => {
-            corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect()
-        }
         5 => {
             let turned = |(i, c): (usize, &[u32])| {
                 if i % 2 == 0 { [c[0], c[1], c[2]] } else { [c[0], c[2], c[1]] }
@@ -245,9 +241,10 @@ impl Collected {
         if shape.influences.is_none() && place.carried.is_none() {
             return Ok(());
         }
-        for (moved, (name, weight)) in shape.offsets.iter().zip(targets) {
+        let moved = shape.offsets.iter().zip(targets).filter(|(moved, _)| !moved.is_empty());
+        for (moved, (name, weight)) in moved {
             self.offsets += moved.len();
-            if self.offsets > MOST_OFFSETS {
+            if self.offsets > MOST_OFFSETS || out.morphs.len() > MOST_MORPHS {
                 return Err(morphs::too_many());
             }
             let offsets = moved.iter().map(|(v, by)| {
@@ -287,18 +284,18 @@ impl Collected {
     }
 
     /// Returns what was collected, with a remark if the file is posed.
-    fn loaded_and_apart(self, pose: Pose) -> Loaded {
+    fn finish(self, pose: Pose) -> Loaded {
         let mut out = self.loaded;
         let (low, high) =
             out.positions.iter().fold((Vec3::MAX, Vec3::MIN), |(a, b), p| (a.min(*p), b.max(*p)));
         if self.apart > 1e-3 * f64::from((high - low).max_element()) {
-            let (read, other) = match pose {
-                Pose::File => ("the pose that its nodes are in is read", "bind"),
-                Pose::Bind => ("its bind pose is read", "file"),
+            let (read, other, the_other) = match pose {
+                Pose::File => ("the pose of its nodes", "bind", "the bind pose"),
+                Pose::Bind => ("its bind pose", "file", "that of its nodes"),
             };
             out.remarks.push(format!(
-                "the glTF file is posed: {read}, from which vertices are up to {:.3} away in the \
-                 other (`pose = \"{other}\"`)",
+                "the glTF file is posed: {read} is read; `pose = \"{other}\"` reads {the_other}, \
+                 where vertices are up to {:.3} away",
                 self.apart
             ));
         }
