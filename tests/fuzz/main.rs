@@ -120,7 +120,7 @@ static A_BANK: LazyLock<Vec<u8>> = LazyLock::new(|| {
 });
 
 /// Returns a triangle on a joint, as `.glb`, and as `.gltf` with an embedded and an
-/// external buffer.
+/// external buffer; a file with what few have, and compressed ones.
 fn bodies() -> Vec<Vec<u8>> {
     let document = || {
         let mut w = gltf::Writer::default();
@@ -145,7 +145,12 @@ fn bodies() -> Vec<Vec<u8>> {
     let (mut beside, _) = document();
     beside["buffers"][0]["uri"] = "x.bin".into();
     let (inside, buffer) = document();
-    vec![gltf::packed(&inside, &buffer), within.to_string().into(), beside.to_string().into()]
+    let mut all =
+        vec![gltf::packed(&inside, &buffer), within.to_string().into(), beside.to_string().into()];
+    all.push(gltf::everything());
+    let compressed = files(&root().join("tests/data/gltf"), ".glb");
+    all.extend(compressed.iter().map(|path| std::fs::read(path).unwrap()));
+    all
 }
 
 const CAMERAS: [&str; 2] = [
