@@ -99,7 +99,7 @@ impl<'a> Data<'a> {
         let e = self.elements_or_zeros(index, shape, components)?;
         let a = self.accessor(index)?;
         if a.buffer_view.is_none() {
-            // Zeros take no room in the file, so their number says nothing of its size.
+            // Zeros take no room in the file, so the file's size must bound their number.
             let bytes: usize = self.buffers.iter().map(|b| b.len()).sum();
             if a.sparse.is_none() {
                 return Err(wrong(index, "has no bytes (no bufferView)"));

@@ -107,8 +107,8 @@ impl Loaded {
     /// omitted. Vertices that differ only in their texture coordinates or normals are merged.
     ///
     /// # Errors
-    /// No skin; as [`Armature::new`]: weights that do not sum to 1; too many morphs for so many
-    /// vertices.
+    /// No skin; as [`Armature::new`]: weights that do not sum to 1; more than 50 million offsets of
+    /// morphs.
     pub fn armature(self) -> Result<Armature, GeomError> {
         let Some(rig) = self.rig else {
             return Err(GeomError::invalid(

@@ -1,14 +1,17 @@
 //! Skins: which nodes are joints, where they are at rest, and which joints move each
 //! vertex.
 //!
-//! The rest pose is the bind pose, or that of the file's nodes. The matrix A from a skin's vertices and joints to the
-//! scene is its root joint's global transform times inverse bind matrix. It is the same
-//! for all joints if the file's nodes are in the bind pose, and usually the identity.
-//! glTF moves a vertex by the sum of `w_j G_j B_j`. With `G_j` at rest equal to
+//! The rest pose is the bind pose, or that of the file's nodes. The matrix A from a skin's
+//! vertices and joints to the scene is its root joint's global transform times inverse bind
+//! matrix. It is the same for all joints if the file's nodes are in the bind pose, and usually
+//! the identity. glTF moves a vertex by the sum of `w_j G_j B_j`. With `G_j` at rest equal to
 //! `A B_j^-1`, this is [`Rig`]'s own rule for heads `A B_j^-1 0`, so rest frames can be
 //! aligned with the world.
+//!
+//! In a posed file joints disagree, and the root joint is often posed as well. Then A is the
+//! transform of the mesh's node or of the root's parent, or the identity, as exporters have it
+//! ([`usual`]).
 
-use super::Pose;
 use super::access::{Data, F32, U8, U16};
 use super::container::name_of;
 use super::draco::Contents;
