@@ -127,10 +127,14 @@ pub fn obj(bytes: &[u8]) {
 pub fn gltf(bytes: &[u8]) {
     let beside = [0u8; 256];
     let read = |_: &str| Ok(beside.to_vec());
-    if let Ok(loaded) = gltf_file::load(bytes, &FileFrame::default(), &read) {
-        assert!(loaded.triangles.iter().flatten().all(|v| (*v as usize) < loaded.positions.len()));
-        let _ = loaded.clone().mesh();
-        let _ = loaded.armature();
+    for pose in [gltf_file::Pose::Bind, gltf_file::Pose::File] {
+        if let Ok(loaded) = gltf_file::load(bytes, &FileFrame::default(), pose, &read) {
+            assert!(
+                loaded.triangles.iter().flatten().all(|v| (*v as usize) < loaded.positions.len())
+            );
+            let _ = loaded.clone().mesh();
+            let _ = loaded.armature();
+        }
     }
     data("mesh", "x.gltf", bytes, &beside);
     data("armature", "x.gltf", bytes, &beside);

@@ -130,3 +130,50 @@ pub fn skinned(body: &Armature, to_file: DMat3, root: &Value) -> Vec<u8> {
     });
     glb(w, document)
 }
+
+/// Returns a file with what few files have: copies of a mesh, a body in another pose than its
+/// bind pose, morph targets of which one is sparse, each with a weight, and a hidden node.
+pub fn everything() -> Vec<u8> {
+    let mut w = Writer::default();
+    let square = w.floats("VEC3", &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0]);
+    let corners = w.bytes("SCALAR", &[0, 1, 2, 0, 2, 3]);
+    let up = w.floats("VEC3", &[0.0, 0.0, 1.0].repeat(4));
+    let (sparse, places) = (w.floats("VEC3", &[0.0, 3.0, 0.0]), w.bytes("SCALAR", &[2]));
+    let joints = w.bytes("VEC4", &[0, 1, 0, 0].repeat(4));
+    let weights = w.floats(
+        "VEC4",
+        &[[1.0, 0.0], [1.0, 0.0], [0.25, 0.75], [0.0, 1.0]].map(|[a, b]| [a, b, 0.0, 0.0]).concat(),
+    );
+    let at = w.floats("VEC3", &[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 4.0, 0.0, 0.0]);
+    let turned = w.shorts("VEC4", &[0, 0, 0, 32767, 0, 0, 23170, 23170, 0, 0, 0, 32767]);
+    let scaled = w.floats("VEC3", &[1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 3.0, -1.0]);
+    let targets = json!([{ "POSITION": up }, { "POSITION": 99 }]);
+    let attributes = json!({ "POSITION": square, "JOINTS_0": joints, "WEIGHTS_0": weights });
+    let mut d = json!({
+        "scenes": [{ "nodes": [0, 1, 2, 4] }],
+        "nodes": [
+            { "mesh": 0, "skin": 0, "name": "body" },
+            { "name": "root", "children": [3] },
+            { "mesh": 1, "name": "many", "extensions": { "EXT_mesh_gpu_instancing": {
+                "attributes": { "TRANSLATION": at, "ROTATION": turned, "SCALE": scaled } } } },
+            { "name": "tip", "rotation": [0, 0, 0.6, 0.8] },
+            { "mesh": 1, "name": "unseen", "extensions": { "KHR_node_visibility": { "visible": false } } },
+        ],
+        "meshes": [
+            { "primitives": [{ "attributes": attributes, "indices": corners, "targets": targets }],
+              "weights": [0.5, 1], "extras": { "targetNames": ["lift", "point"] } },
+            { "primitives": [{ "attributes": { "POSITION": square }, "indices": corners }] },
+        ],
+        "skins": [{ "joints": [1, 3] }],
+        "extensionsUsed": ["EXT_mesh_gpu_instancing", "KHR_node_visibility"],
+    });
+    let bytes = w.document(&mut d);
+    let all = d["accessors"].as_array_mut().unwrap();
+    (all[turned]["componentType"], all[turned]["normalized"]) = (5122.into(), true.into());
+    let (index, view) = (all.len(), |k: usize| all[k]["bufferView"].clone());
+    let sparse = json!({ "componentType": 5126, "type": "VEC3", "count": 4, "sparse": {
+        "count": 1, "indices": { "bufferView": view(places), "componentType": 5121 }, "values": { "bufferView": view(sparse) } } });
+    all.push(sparse);
+    d["meshes"][0]["primitives"][0]["targets"][1]["POSITION"] = index.into();
+    packed(&d, &bytes)
+}

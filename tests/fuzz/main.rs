@@ -120,7 +120,7 @@ static A_BANK: LazyLock<Vec<u8>> = LazyLock::new(|| {
 });
 
 /// Returns a triangle on a joint, as `.glb`, and as `.gltf` with an embedded and an
-/// external buffer.
+/// external buffer; a file with what few have, and compressed ones.
 fn bodies() -> Vec<Vec<u8>> {
     let document = || {
         let mut w = gltf::Writer::default();
@@ -145,7 +145,12 @@ fn bodies() -> Vec<Vec<u8>> {
     let (mut beside, _) = document();
     beside["buffers"][0]["uri"] = "x.bin".into();
     let (inside, buffer) = document();
-    vec![gltf::packed(&inside, &buffer), within.to_string().into(), beside.to_string().into()]
+    let mut all =
+        vec![gltf::packed(&inside, &buffer), within.to_string().into(), beside.to_string().into()];
+    all.push(gltf::everything());
+    let compressed = files(&root().join("tests/data/gltf"), ".glb");
+    all.extend(compressed.iter().map(|path| std::fs::read(path).unwrap()));
+    all
 }
 
 const CAMERAS: [&str; 2] = [
@@ -339,8 +344,13 @@ fn accepts_its_seeds(name: &str, target: Target) {
         let good = match name {
             "obj" => obj::load(seed).is_ok(),
             // One of them has an external buffer.
-            "gltf" => load(seed, &FileFrame::default(), &|_| Err("beside".into()))
-                .map_or_else(|e| e.to_string().contains("beside"), |loaded| loaded.mesh().is_ok()),
+            "gltf" => {
+                load(seed, &FileFrame::default(), Default::default(), &|_| Err("beside".into()))
+                    .map_or_else(
+                        |e| e.to_string().contains("beside"),
+                        |loaded| loaded.mesh().is_ok(),
+                    )
+            }
             "image" => photo::decode(seed, &Limits::default()).is_ok(),
             "array" => depth::decode(seed, Some(1.0), 0.0, &Limits::default()).is_ok(),
             "camera" => Camera::from_json(text()).is_ok(),

@@ -10,4 +10,5 @@ mod caches;
 mod depths;
 mod drawing;
 mod gltf;
+mod gltf_shapes;
 mod keypoints;

@@ -19,12 +19,25 @@ use std::sync::Arc;
 
 const PATH: Arg = arg("file", Type::Str, "The path, relative to the program's folder.");
 
-const SHAPE: &[Arg] = &[
-    PATH,
-    word("up", &["y", "x", "z"], "The file's up axis; it is rotated to +y."),
+const UP: Arg = word("up", &["y", "x", "z"], "The file's up axis; it is rotated to +y.");
+
+const UNIT: Arg =
     num("unit", 1.0, "The length of the file's unit in scene units: 0.01 for centimetres.")
-        .unit("m"),
-];
+        .unit("m");
+
+const BODY_POSE: Arg = word(
+    "pose",
+    &["bind", "file"],
+    "The rest pose of a glTF file: that in which its mesh was bound to the joints, or that of \
+     its nodes.",
+);
+
+const MESH_POSE: Arg = word(
+    "pose",
+    &["file", "bind"],
+    "The pose of a glTF file with a skin: that of its nodes, as viewers show it, or that in \
+     which the mesh was bound to the joints.",
+);
 
 const NETWORK: &[Arg] = &[
     opt("file", Type::Str, "none", "The path, relative to the program's folder."),
@@ -115,10 +128,10 @@ pub(super) const TABLE: &[Row] = &[
     DETECTOR,
     kind(
         "armature",
-        SHAPE,
+        &[PATH, UP, UNIT, BODY_POSE],
         Type::Object("an armature"),
         "A body: a glTF file (`.glb`, `.gltf`) with a skin, or a JSON rig file, with its mesh and \
-         morphs in the same folder: see `docs/howto/bodies.md`. `up` and `unit` apply to glTF.",
+         morphs in the same folder: see `docs/howto/bodies.md`. The options apply to glTF.",
         || {
             Arc::new(Shape {
                 load: armature,
@@ -142,7 +155,7 @@ pub(super) const TABLE: &[Row] = &[
     ),
     kind(
         "mesh",
-        SHAPE,
+        &[PATH, UP, UNIT, MESH_POSE],
         Type::Object("a solid"),
         "A Wavefront OBJ mesh, each object or group a part, or the default scene of a glTF file \
          (`.glb`, `.gltf`), each node with a mesh a part.",
@@ -260,10 +273,17 @@ impl DataFormat for NoFiles {
     }
 }
 
+/// How a file of a mesh or an armature is to be read.
+struct As {
+    frame: FileFrame,
+    /// The pose, if the program says which.
+    pose: Option<gltf::Pose>,
+}
+
 /// A mesh or an armature, in a frame of its own.
 #[derive(Debug)]
 struct Shape {
-    load: fn(&str, &[u8], &FileFrame, &ReadRelative) -> Result<Value, GeomError>,
+    load: fn(&str, &[u8], &As, &ReadRelative) -> Result<Value, GeomError>,
     example: &'static str,
 }
 
@@ -275,12 +295,12 @@ impl DataFormat for Shape {
         options: &Options,
         beside: &ReadRelative,
     ) -> Result<Value, Fault> {
-        let frame = frame(options).map_err(|why| unreadable(file, &why))?;
-        (self.load)(file, bytes, &frame, beside).map_err(|e| unreadable(file, &e.to_string()))
+        let how = how(options).map_err(|why| unreadable(file, &why))?;
+        (self.load)(file, bytes, &how, beside).map_err(|e| unreadable(file, &e.to_string()))
     }
 
     fn check_option(&self, name: &str, value: &Literal) -> Result<(), String> {
-        frame(&Options::single(name, value.clone())).map(|_| ())
+        how(&Options::single(name, value.clone())).map(|_| ())
     }
 
     fn example(&self) -> Option<&'static str> {
@@ -288,41 +308,36 @@ impl DataFormat for Shape {
     }
 }
 
-fn mesh(
-    file: &str,
-    bytes: &[u8],
-    frame: &FileFrame,
-    beside: &ReadRelative,
-) -> Result<Value, GeomError> {
-    let mesh = match gltf::is_gltf(file, bytes) {
-        true => gltf::load(bytes, frame, beside)?.mesh()?,
-        false => obj::load_in(bytes, frame)?,
-    };
-    Ok(Value::object(SolidValue::new(Solid::new(Arc::new(mesh)))))
+fn mesh(file: &str, bytes: &[u8], how: &As, beside: &ReadRelative) -> Result<Value, GeomError> {
+    let value =
+        |mesh, remarks| Value::object(SolidValue::read(Solid::new(Arc::new(mesh)), remarks));
+    if gltf::is_gltf(file, bytes) {
+        let pose = how.pose.unwrap_or(gltf::Pose::File);
+        let mut loaded = gltf::load(bytes, &how.frame, pose, beside)?;
+        let remarks = std::mem::take(&mut loaded.remarks);
+        return Ok(value(loaded.mesh()?, remarks));
+    }
+    Ok(value(obj::load_in(bytes, &how.frame)?, Vec::new()))
 }
 
 /// Reads a glTF file, or a rig, its mesh, and its morphs if it names some.
-fn armature(
-    file: &str,
-    bytes: &[u8],
-    frame: &FileFrame,
-    beside: &ReadRelative,
-) -> Result<Value, GeomError> {
+fn armature(file: &str, bytes: &[u8], how: &As, beside: &ReadRelative) -> Result<Value, GeomError> {
     let invalid = |why: &str| GeomError::Invalid(why.to_owned());
-    let value = |body: Armature| Value::object(ArmatureValue::new(body));
     if gltf::is_gltf(file, bytes) {
-        let loaded = gltf::load(bytes, frame, beside)?;
+        let mut loaded = gltf::load(bytes, &how.frame, how.pose.unwrap_or_default(), beside)?;
         if loaded.rig.is_none() {
             return Err(invalid(
                 "the glTF file has no skin, so it does not define which joint moves which \
                  vertices; read it with mesh(…) and rig it with scene.autorig",
             ));
         }
-        return loaded.armature().map(value);
+        let remarks = std::mem::take(&mut loaded.remarks);
+        return Ok(Value::object(ArmatureValue::read(loaded.armature()?, remarks)));
     }
-    if *frame != FileFrame::default() {
+    if how.frame != FileFrame::default() || how.pose.is_some() {
         return Err(invalid(
-            "`up` and `unit` are for glTF files; a rig file is in the scene's axes and units",
+            "`up`, `unit` and `pose` are for glTF files; a rig file is in the scene's axes and \
+             units",
         ));
     }
     let file = rig_from_json(bytes)?;
@@ -335,7 +350,7 @@ fn armature(
         let morphs = morphs_from_json(&read(path)?, &rig).map_err(|e| within(path, e))?;
         body = body.with_morphs(morphs).map_err(|e| within(path, e))?;
     }
-    Ok(value(body))
+    Ok(Value::object(ArmatureValue::new(body)))
 }
 
 /// A person's joints; `#ID` after the path selects the person.
@@ -377,12 +392,12 @@ pub fn load_keypoints(file: &str, bytes: &[u8], picture: Option<&str>) -> Result
     })
 }
 
-/// The axes and the unit of a mesh file.
+/// The axes, the unit and the pose of a mesh file.
 ///
 /// # Errors
 /// A value that does not fit: a message for the user.
-fn frame(options: &Options) -> Result<FileFrame, String> {
-    let (mut up, mut unit) = (UpAxis::default(), 1.0);
+fn how(options: &Options) -> Result<As, String> {
+    let (mut up, mut unit, mut pose) = (UpAxis::default(), 1.0, None);
     for (name, value) in options.iter() {
         match (name, value) {
             ("up", Literal::Str(axis)) => {
@@ -398,8 +413,11 @@ fn frame(options: &Options) -> Result<FileFrame, String> {
             ("up", _) => return Err("`up` must be an axis in quotes".into()),
             ("unit", Literal::Num(x)) => unit = *x,
             ("unit", _) => return Err("`unit` must be a literal number".into()),
+            ("pose", Literal::Str(s)) if **s == *"bind" => pose = Some(gltf::Pose::Bind),
+            ("pose", Literal::Str(s)) if **s == *"file" => pose = Some(gltf::Pose::File),
+            ("pose", _) => return Err("`pose` must be \"bind\" or \"file\"".into()),
             _ => {}
         }
     }
-    FileFrame::new(up, unit).map_err(|e| e.to_string())
+    FileFrame::new(up, unit).map(|frame| As { frame, pose }).map_err(|e| e.to_string())
 }

@@ -73,7 +73,8 @@ pub(super) const TABLE: &[Row] = &[
         SECTION,
         &[
             arg("rig", ARMATURE, "The armature."),
-            arg("morphs", Type::Record, "The weight of each morph: 1 is the full morph."),
+            arg("morphs", Type::Record, "The weight of each morph: 1 is the full morph; those not named \
+                keep the weight that a glTF file has for them."),
             num("cloth", 0.0, "The distance of the surface (clothing) from the skin, \
                 along the normals of the rest pose; joints are unchanged.")
             .unit("the mesh's units"),

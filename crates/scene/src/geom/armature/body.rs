@@ -86,6 +86,8 @@ pub struct Armature {
     rig: Rig,
     surface: Arc<LazySurface>,
     skin: Arc<Skin>,
+    /// The amount of each morph that the file gave the body; 0 once it was set.
+    weights: Arc<[f64]>,
 }
 
 /// Derivatives with respect to a body at rest.
@@ -157,7 +159,7 @@ impl Armature {
         let surface = Arc::new(lazy);
         let rest = Arc::clone(&surface);
         let skin = Skin { triangles, influences, parts, morphs: Vec::new(), anchors, rest };
-        Ok(Armature { rig, surface, skin: Arc::new(skin) })
+        Ok(Armature { rig, surface, skin: Arc::new(skin), weights: Arc::default() })
     }
 
     /// Adds morphs.
@@ -171,11 +173,12 @@ impl Armature {
                 return Err(GeomError::invalid(format!("two morphs are called `{}`", m.name)));
             }
         }
+        let weights = morphs.iter().map(|m| m.weight).collect();
         let skin = match Arc::try_unwrap(self.skin) {
             Ok(skin) => Skin { morphs, ..skin },
             Err(_) => return Err(GeomError::invalid("this body already has morphs")),
         };
-        Ok(Armature { skin: Arc::new(skin), ..self })
+        Ok(Armature { skin: Arc::new(skin), weights, ..self })
     }
 
     /// The rig.
@@ -203,7 +206,8 @@ impl Armature {
         self.skin.morphs.iter().map(|m| &*m.name)
     }
 
-    /// Returns the body in another shape: adds each morph's offsets, times its amount.
+    /// Returns the body in another shape: adds each morph's offsets, times its amount. A morph
+    /// that the file gave an amount has the new one instead, the first time.
     ///
     /// # Errors
     /// An unknown morph, or an amount that is not finite.
@@ -225,6 +229,7 @@ impl Armature {
         let (mut heads, mut tails) = (vec![DVec3::ZERO; n], vec![DVec3::ZERO; n]);
         let mut points = vec![DVec3::ZERO; self.rig.keypoints().len()];
         let mut added = Vec::with_capacity(amounts.len());
+        let mut weights = Arc::clone(&self.weights);
         for (name, amount) in amounts {
             let Some(k) = self.skin.morphs.iter().position(|m| *m.name == **name) else {
                 let all: Vec<&str> = self.morphs().collect();
@@ -239,14 +244,18 @@ impl Armature {
                 )));
             }
             let m = &self.skin.morphs[k];
-            m.move_joints(*amount, &mut heads, &mut tails);
-            added.push((k, *amount));
+            let mut amount = *amount;
+            if weights[k] != 0.0 {
+                amount -= std::mem::take(&mut Arc::make_mut(&mut weights)[k]);
+            }
+            m.move_joints(amount, &mut heads, &mut tails);
+            added.push((k, amount));
             for (d, anchor) in points.iter_mut().zip(&self.skin.anchors) {
-                *d += m.at(*anchor) * *amount;
+                *d += m.at(*anchor) * amount;
             }
         }
         let skin = Arc::clone(&self.skin);
-        Ok(self.reshaped(&heads, &tails, &points, move |positions| {
+        let reshaped = self.reshaped(&heads, &tails, &points, move |positions| {
             for (k, amount) in added {
                 skin.morphs[k].move_vertices(amount, positions);
             }
@@ -254,7 +263,8 @@ impl Armature {
                 let normals = &skin.rest.normals;
                 positions.iter_mut().zip(normals).for_each(|(p, n)| *p += *n * cloth as f32);
             }
-        }))
+        });
+        Ok(Armature { weights, ..reshaped })
     }
 
     /// Returns the body with the given offsets added to joints and keypoints at rest, and
@@ -276,6 +286,7 @@ impl Armature {
             rig: self.rig.moved(heads, tails, points),
             surface: Arc::new(LazyLock::new(Box::new(surface))),
             skin: Arc::clone(&self.skin),
+            weights: Arc::clone(&self.weights),
         }
     }
 

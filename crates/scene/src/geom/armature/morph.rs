@@ -10,6 +10,8 @@ use std::sync::Arc;
 pub struct Morph {
     /// The name.
     pub name: Arc<str>,
+    /// The amount that the body at rest has it with, often 0.
+    pub weight: f64,
     /// Offsets of the vertices.
     pub vertices: Vec<Vec3>,
     /// Offsets of the joints' heads, in rig order.

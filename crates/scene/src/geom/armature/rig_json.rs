@@ -139,6 +139,7 @@ pub fn morphs_from_json(bytes: &[u8], rig: &Rig) -> Result<Vec<Morph>, GeomError
     };
     let one = |(name, m): (String, JsonMorph)| {
         Ok(Morph {
+            weight: 0.0,
             vertices: m.vertices.into_iter().map(Vec3::from).collect(),
             heads: by_rig(&name, &m.heads)?,
             tails: by_rig(&name, &m.tails)?,

@@ -1,6 +1,7 @@
 //! The container of a glTF file: the chunks of a GLB, and buffers within the file, in
 //! other files, or in `data:` URIs.
 
+use super::extensions;
 use super::json::{Document, Node};
 use crate::geom::GeomError;
 use base64::Engine as _;
@@ -13,17 +14,6 @@ pub type Read<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
 
 /// The maximum number of buffers of a file.
 const MOST_BUFFERS: usize = 1024;
-/// Prefixes of required extensions that do not affect a file's triangles.
-const HARMLESS: [&str; 7] = [
-    "KHR_materials",
-    "KHR_texture",
-    "EXT_texture",
-    "MSFT_texture",
-    "KHR_lights",
-    "KHR_mesh_quantization",
-    "KHR_xmp",
-];
-
 fn invalid(message: impl Into<String>) -> GeomError {
     GeomError::invalid(message)
 }
@@ -56,15 +46,8 @@ pub(super) fn open(bytes: &[u8]) -> Result<(Document, Option<&[u8]>), GeomError>
     if !version.starts_with("2.") {
         return Err(invalid(format!("only glTF version 2 is supported, not {version}")));
     }
-    match document.extensions_required.iter().find(|x| !HARMLESS.iter().any(|h| x.starts_with(h))) {
-        None => Ok((document, bin)),
-        Some(x) if x.contains("compression") => Err(invalid(format!(
-            "the glTF file is compressed ({x}), which is not supported; export without compression"
-        ))),
-        Some(x) => Err(invalid(format!(
-            "the glTF file requires the extension {x}, which is not supported"
-        ))),
-    }
+    extensions::check(&document)?;
+    Ok((document, bin))
 }
 
 fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), GeomError> {
@@ -89,7 +72,8 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), GeomError> {
     Ok((text, (kind == b"BIN\0").then_some(bin)))
 }
 
-/// Returns the contents of every buffer, each at least as long as it declares.
+/// Returns the contents of every buffer, each at least as long as it declares; those that stand
+/// for compressed views are empty.
 pub(super) fn buffers<'a>(
     document: &Document,
     bin: Option<&'a [u8]>,
@@ -103,6 +87,10 @@ pub(super) fn buffers<'a>(
     }
     let mut all = Vec::with_capacity(count);
     for (i, b) in document.buffers.iter().enumerate() {
+        if b.extensions.meshopt.as_ref().is_some_and(|m| m.fallback) {
+            all.push(Cow::Borrowed(&[][..]));
+            continue;
+        }
         let bytes: Cow<[u8]> = match (&b.uri, bin) {
             (None, Some(bin)) if i == 0 => Cow::Borrowed(bin),
             (None, _) => return Err(invalid(format!("buffer {i} of the glTF file has no URI"))),

@@ -12,7 +12,8 @@ pub(super) struct Nodes {
     pub parents: Vec<Option<usize>>,
     /// The transforms from the nodes' spaces to the scene.
     pub global: Vec<DAffine3>,
-    /// True if each node belongs to the default scene.
+    /// True if each node belongs to the default scene, and neither it nor an ancestor is hidden
+    /// (`KHR_node_visibility`).
     pub drawn: Vec<bool>,
 }
 
@@ -76,25 +77,41 @@ impl Nodes {
             }
             drawn[*i] |= parents[*i].is_some_and(|p| drawn[p]);
         }
+        let hidden =
+            |n: &Node| n.extensions.visibility.as_ref().is_some_and(|v| v.visible == Some(false));
+        let mut shown = vec![true; nodes.len()];
+        for i in &order {
+            shown[*i] = !hidden(&nodes[*i]) && parents[*i].is_none_or(|p| shown[p]);
+            drawn[*i] &= shown[*i];
+        }
         Ok(Nodes { order, parents, global, drawn })
     }
 }
 
 /// Returns the transform from a node's space to its parent's.
 fn local(n: &Node) -> DAffine3 {
-    if let Some(m) = &n.matrix {
-        return DAffine3::from_mat4(DMat4::from_cols_array(m));
+    match &n.matrix {
+        Some(m) => DAffine3::from_mat4(DMat4::from_cols_array(m)),
+        None => placed(n.translation, n.rotation, n.scale),
     }
-    let rotation = n.rotation.map_or(DQuat::IDENTITY, |q| {
+}
+
+/// Returns the transform of a translation, a rotation (a quaternion, of any length) and a
+/// scale, of which the last acts first.
+pub(super) fn placed(
+    translation: Option<[f64; 3]>,
+    rotation: Option<[f64; 4]>,
+    scale: Option<[f64; 3]>,
+) -> DAffine3 {
+    let rotation = rotation.map_or(DQuat::IDENTITY, |q| {
         let q = DQuat::from_array(q);
         let length = q.length();
         if length > 0.0 { q / length } else { DQuat::IDENTITY }
     });
-    let scale = n.scale.map_or(DVec3::ONE, DVec3::from);
     DAffine3::from_scale_rotation_translation(
-        scale,
+        scale.map_or(DVec3::ONE, DVec3::from),
         rotation,
-        n.translation.map_or(DVec3::ZERO, DVec3::from),
+        translation.map_or(DVec3::ZERO, DVec3::from),
     )
 }
 
