@@ -12,7 +12,9 @@ use pcadlang_engine::lang::builtins::{Arg, Default, Row, Type, arg, flag, num, o
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::geom::armature::{Armature, morphs_from_json, rig_from_json};
-use pcadlang_scene::geom::{FileFrame, GeomError, Solid, UpAxis, gltf, obj};
+use pcadlang_scene::geom::{
+    FileFrame, GeomError, MeshFile, Solid, UpAxis, face_outward, gltf, not_an_armature,
+};
 use pcadlang_scene::vision::keypoints::{self, Keypoints, People};
 use pcadlang_scene::vision::{ContourMap, Limits, VisionError, depth, mask, npy, photo};
 use std::sync::Arc;
@@ -143,9 +145,10 @@ pub(super) const TABLE: &[Row] = &[
         "mesh",
         SHAPE,
         Type::Object("a solid"),
-        "A Wavefront OBJ mesh, each object or group a part, or the default scene of a glTF file \
-         (`.glb`, `.gltf`), each node with a mesh a part.",
-        || Arc::new(Shape { load: mesh, example: "mesh(\"file.glb\", up = \"z\", unit = 0.01)" }),
+        "A mesh: OBJ, each object or group a part; STL; PLY; or the default scene of a glTF file \
+         (`.glb`, `.gltf`), each node with a mesh a part. Closed bodies that are inside out are \
+         turned over, and said.",
+        || Arc::new(Shape { load: mesh, example: "mesh(\"file.stl\", up = \"z\", unit = 0.001)" }),
     ),
 ];
 
@@ -294,11 +297,16 @@ fn mesh(
     frame: &FileFrame,
     beside: &ReadRelative,
 ) -> Result<Value, GeomError> {
-    let mesh = match gltf::is_gltf(file, bytes) {
-        true => gltf::load(bytes, frame, beside)?.mesh()?,
-        false => obj::load_in(bytes, frame)?,
+    let (mesh, remarks) = if gltf::is_gltf(file, bytes) {
+        let mut loaded = gltf::load(bytes, frame, beside)?;
+        let turned = face_outward(&loaded.positions, &mut loaded.triangles);
+        (loaded.mesh()?, turned.into_iter().collect())
+    } else {
+        let mut read = MeshFile::read(file, bytes)?.placed(frame).outward();
+        let remarks = std::mem::take(&mut read.remarks);
+        (read.mesh()?, remarks)
     };
-    Ok(Value::object(SolidValue::new(Solid::new(Arc::new(mesh)))))
+    Ok(Value::object(SolidValue::read(Solid::new(Arc::new(mesh)), remarks)))
 }
 
 /// Reads a glTF file, or a rig, its mesh, and its morphs if it names some.
@@ -309,16 +317,20 @@ fn armature(
     beside: &ReadRelative,
 ) -> Result<Value, GeomError> {
     let invalid = |why: &str| GeomError::Invalid(why.to_owned());
-    let value = |body: Armature| Value::object(ArmatureValue::new(body));
+    let value = |body: Armature, remarks| Value::object(ArmatureValue::read(body, remarks));
     if gltf::is_gltf(file, bytes) {
-        let loaded = gltf::load(bytes, frame, beside)?;
+        let mut loaded = gltf::load(bytes, frame, beside)?;
+        let turned = face_outward(&loaded.positions, &mut loaded.triangles);
         if loaded.rig.is_none() {
             return Err(invalid(
                 "the glTF file has no skin, so it does not define which joint moves which \
                  vertices; read it with mesh(…) and rig it with scene.autorig",
             ));
         }
-        return loaded.armature().map(value);
+        return Ok(value(loaded.armature()?, turned.into_iter().collect()));
+    }
+    if let Some(why) = not_an_armature(file, bytes) {
+        return Err(GeomError::Invalid(why));
     }
     if *frame != FileFrame::default() {
         return Err(invalid(
@@ -328,14 +340,15 @@ fn armature(
     let file = rig_from_json(bytes)?;
     let within = |path: &str, e: GeomError| GeomError::Invalid(format!("{path}: {e}"));
     let read = |path: &str| beside(path).map_err(GeomError::Invalid);
-    let mesh = obj::indexed(&read(&file.mesh)?).map_err(|e| within(&file.mesh, e))?;
+    let mesh = MeshFile::read(&file.mesh, &read(&file.mesh)?).map_err(|e| within(&file.mesh, e))?;
+    let mesh = mesh.outward();
     let rig = file.rig.clone();
     let mut body = Armature::new(file.rig, mesh.positions, mesh.triangles, file.influences)?;
     if let Some(path) = &file.morphs {
         let morphs = morphs_from_json(&read(path)?, &rig).map_err(|e| within(path, e))?;
         body = body.with_morphs(morphs).map_err(|e| within(path, e))?;
     }
-    Ok(value(body))
+    Ok(value(body, mesh.remarks))
 }
 
 /// A person's joints; `#ID` after the path selects the person.
