@@ -163,14 +163,21 @@ fn leaves(v: &Value) -> usize {
 fn find<'a>(values: &'a [(String, Value)], column: &str) -> Option<&'a Value> {
     values.iter().find_map(|(name, v)| {
         let rest = column.strip_prefix(name.as_str())?;
-        if rest.is_empty() {
-            return Some(v);
-        }
-        rest.strip_prefix('/')?.split('/').try_fold(v, |v, field| match v {
-            Value::Record(r) => r.get(field),
-            _ => None,
-        })
+        if rest.is_empty() { Some(v) } else { within(v, rest.strip_prefix('/')?) }
     })
+}
+
+/// Finds what is at a path of fields. A name in quotes may have a `/` in it.
+fn within<'a>(v: &'a Value, path: &str) -> Option<&'a Value> {
+    let Value::Record(r) = v else { return None };
+    let below = |v: &'a Value, rest: &str| match rest {
+        "" => Some(v),
+        rest => within(v, rest.strip_prefix('/')?),
+    };
+    let first = path.split('/').next().unwrap_or_default();
+    let plain = r.get(first).and_then(|v| below(v, &path[first.len()..]));
+    let mut slashed = r.iter().filter(|(k, _)| k.contains('/'));
+    plain.or_else(|| slashed.find_map(|(k, v)| below(v, path.strip_prefix(&**k)?)))
 }
 
 fn flatten(v: &Value, out: &mut Vec<f64>) {
