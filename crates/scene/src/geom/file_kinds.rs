@@ -10,14 +10,24 @@ pub(super) enum Kind {
     Other(&'static Other),
 }
 
+/// What files of a kind may hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Holds {
+    /// A mesh with joints.
+    Body,
+    /// A mesh.
+    Mesh,
+    /// Something else.
+    Other,
+}
+
 /// A kind that is not read.
 #[derive(Debug)]
 pub(super) struct Other {
     /// The kind, as in "the file is …".
     name: &'static str,
     is: fn(&Start) -> bool,
-    /// True if it may have joints.
-    joints: bool,
+    holds: Holds,
     /// What to do.
     advice: &'static str,
 }
@@ -31,13 +41,11 @@ impl Other {
     /// The error where an armature is expected.
     fn as_armature(&self) -> String {
         let Other { name, advice, .. } = self;
-        match self.joints {
-            true => format!("the file is {name}, which is not read: {advice}"),
-            false => format!(
-                "the file is {name}, which is not read as an armature; for a mesh, {advice}, and rig \
-                 it with scene.autorig"
-            ),
-        }
+        let then = match self.holds {
+            Holds::Mesh => ", read that with mesh(…) and rig it with scene.autorig",
+            Holds::Body | Holds::Other => "",
+        };
+        format!("the file is {name}, which is not read as an armature: {advice}{then}")
     }
 }
 
@@ -108,77 +116,81 @@ const JSON: &Other = &KINDS[0];
 
 #[rustfmt::skip]
 static KINDS: &[Other] = &[
-    Other { name: "JSON, but not glTF", joints: true, is: |s| s.says("{") || s.says("["),
+    Other { name: "JSON, but not glTF", holds: Holds::Other, is: |s| s.says("{") || s.says("["),
         advice: "a rig is read with armature(…), joints with keypoints(…), other data with json(…)" },
-    Other { name: "FBX", joints: true, is: |s| s.is(b"Kaydara FBX Binary") || s.says("; fbx"),
+    Other { name: "FBX", holds: Holds::Body, is: |s| s.is(b"Kaydara FBX Binary") || s.says("; fbx"),
         advice: "open it in Blender and export glTF 2.0 (.glb), or run `assimp export FILE FILE.glb`" },
-    Other { name: "USD", joints: true,
+    Other { name: "USD", holds: Holds::Body,
         is: |s| s.is(b"PXR-USDC") || s.says("#usda") || s.zip(".usd"), advice: BLENDER },
-    Other { name: "a Blender file", joints: true, is: |s| s.is(b"BLENDER"), advice: BLENDER },
-    Other { name: "compressed (Zstandard), perhaps a Blender file", joints: true,
+    Other { name: "a Blender file", holds: Holds::Body, is: |s| s.is(b"BLENDER"), advice: BLENDER },
+    Other { name: "compressed (Zstandard), perhaps a Blender file", holds: Holds::Body,
         is: |s| s.is(b"\x28\xb5\x2f\xfd"), advice: BLENDER },
-    Other { name: "COLLADA (DAE)", joints: true, is: |s| s.xml("<collada"), advice: ASSIMP },
-    Other { name: "Alembic", joints: false, is: |s| s.is(b"Ogawa"), advice: BLENDER },
-    Other { name: "STEP (CAD)", joints: false, is: |s| s.says("iso-10303-21"), advice: CAD },
-    Other { name: "IGES (CAD)", joints: false,
+    Other { name: "COLLADA (DAE)", holds: Holds::Body, is: |s| s.xml("<collada"), advice: ASSIMP },
+    Other { name: "Alembic", holds: Holds::Mesh, is: |s| s.is(b"Ogawa"), advice: BLENDER },
+    Other { name: "STEP (CAD)", holds: Holds::Mesh, is: |s| s.says("iso-10303-21"), advice: CAD },
+    Other { name: "IGES (CAD)", holds: Holds::Mesh,
         is: |s| s.bytes.get(72..80) == Some(b"S      1") || s.bytes.get(72..80) == Some(b"S0000001"), advice: CAD },
-    Other { name: "OpenCASCADE's BRep (CAD)", joints: false,
+    Other { name: "OpenCASCADE's BRep (CAD)", holds: Holds::Mesh,
         is: |s| s.says("dbrep_drawableshape") || s.says("cascade topology"), advice: CAD },
-    Other { name: "DXF (CAD)", joints: false, is: |s| s.says("0\nsection") || s.says("0\r\nsection") || s.is(b"AutoCAD Binary DXF"),
+    Other { name: "DXF (CAD)", holds: Holds::Mesh, is: |s| s.says("0\nsection") || s.says("0\r\nsection") || s.says("999\n") || s.says("999\r\n") || s.is(b"AutoCAD Binary DXF"),
         advice: CAD },
-    Other { name: "Rhino's 3DM (CAD)", joints: false, is: |s| s.is(b"3D Geometry File Format"),
+    Other { name: "Rhino's 3DM (CAD)", holds: Holds::Mesh, is: |s| s.is(b"3D Geometry File Format"),
         advice: "export OBJ or STL from Rhino" },
-    Other { name: "3MF", joints: false, is: |s| s.lists(b"3D/3dmodel.model"), advice: TRIMESH },
-    Other { name: "AMF", joints: false, is: |s| s.xml("<amf"), advice: "export STL or 3MF from the program that made it" },
-    Other { name: "OFF", joints: false,
-        is: |s| ["off", "coff", "noff", "cnoff", "stoff", "4off", "noff"].contains(&s.text.split([' ', '\n', '\r', '\t']).next().unwrap_or("")),
+    Other { name: "3MF", holds: Holds::Mesh, is: |s| s.lists(b"3D/3dmodel.model"), advice: TRIMESH },
+    Other { name: "AMF", holds: Holds::Mesh, is: |s| s.xml("<amf"), advice: "export STL or 3MF from the program that made it" },
+    Other { name: "OFF", holds: Holds::Mesh,
+        is: |s| s.text.split_whitespace().next().and_then(|w| w.strip_suffix("off"))
+            .is_some_and(|kind| kind.bytes().all(|b| b"stcn4".contains(&b))),
         advice: TRIMESH },
-    Other { name: "3DS", joints: false,
-        is: |s| s.is(b"MM") && s.bytes.get(2..6).is_some_and(|b| (6..=s.bytes.len() as u64).contains(&u64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])))),
+    Other { name: "3DS", holds: Holds::Mesh,
+        is: |s| s.is(b"MM") && s.bytes.get(2..6).is_some_and(|b| {
+            let length = b.iter().rev().fold(0, |n, b| n << 8 | usize::from(*b));
+            (6..=s.bytes.len()).contains(&length)
+        }),
         advice: ASSIMP },
-    Other { name: "X3D", joints: false, is: |s| s.xml("<x3d"), advice: ASSIMP },
-    Other { name: "VRML", joints: false, is: |s| s.says("#vrml") || s.says("#x3d"), advice: "open it in MeshLab and export PLY or OBJ" },
-    Other { name: "VTK", joints: false, is: |s| s.says("# vtk") || s.xml("<vtkfile"),
+    Other { name: "X3D", holds: Holds::Mesh, is: |s| s.xml("<x3d"), advice: ASSIMP },
+    Other { name: "VRML", holds: Holds::Mesh, is: |s| s.says("#vrml") || s.says("#x3d"), advice: "open it in MeshLab and export PLY or OBJ" },
+    Other { name: "VTK", holds: Holds::Mesh, is: |s| s.says("# vtk") || s.xml("<vtkfile"),
         advice: "convert it by `meshio convert FILE FILE.ply`" },
-    Other { name: "Gmsh's MSH", joints: false, is: |s| s.says("$meshformat"), advice: "convert it by `gmsh FILE -2 -o FILE.stl`" },
-    Other { name: "a PCD cloud of points", joints: false, is: |s| s.says("# .pcd") || s.says("version .7"),
+    Other { name: "Gmsh's MSH", holds: Holds::Mesh, is: |s| s.says("$meshformat"), advice: "convert it by `gmsh FILE -2 -o FILE.stl`" },
+    Other { name: "a PCD cloud of points", holds: Holds::Other, is: |s| s.says("# .pcd") || s.says("version .7"),
         advice: "make a surface of it first, such as with Open3D's Poisson reconstruction" },
-    Other { name: "a LAS cloud of points", joints: false, is: |s| s.is(b"LASF"),
+    Other { name: "a LAS cloud of points", holds: Holds::Other, is: |s| s.is(b"LASF"),
         advice: "make a surface of it first, such as with CloudCompare or MeshLab" },
-    Other { name: "BVH, a motion without a mesh", joints: true, is: |s| s.says("hierarchy"),
+    Other { name: "BVH, a motion without a mesh", holds: Holds::Body, is: |s| s.says("hierarchy"),
         advice: "open it in Blender with the character that it moves, and export glTF 2.0 (.glb)" },
-    Other { name: "a Maya scene", joints: true, is: |s| s.says("//maya ascii"), advice: "export FBX or USD from Maya, and glTF from Blender" },
-    Other { name: "a model of MikuMikuDance", joints: true, is: |s| s.is(b"PMX ") || s.is(b"Pmd"),
+    Other { name: "a Maya scene", holds: Holds::Body, is: |s| s.says("//maya ascii"), advice: "export FBX or USD from Maya, and glTF from Blender" },
+    Other { name: "a model of MikuMikuDance", holds: Holds::Body, is: |s| s.is(b"PMX ") || s.is(b"Pmd"),
         advice: "import it into Blender (add-on MMD Tools) and export glTF 2.0 (.glb)" },
-    Other { name: "a Python pickle, perhaps of SMPL", joints: true, is: |s| s.bytes.first() == Some(&0x80) && s.bytes.get(1).is_some_and(|v| (2..=5).contains(v)),
+    Other { name: "a Python pickle, perhaps of SMPL", holds: Holds::Body, is: |s| s.bytes.first() == Some(&0x80) && s.bytes.get(1).is_some_and(|v| (2..=5).contains(v)),
         advice: "make it glTF with Blender's SMPL add-on, or a rig file from its arrays (docs/howto/bodies.md)" },
-    Other { name: "an archive of NumPy arrays, perhaps SMPL", joints: true, is: |s| s.zip(".npy"),
+    Other { name: "an archive of NumPy arrays, perhaps SMPL", holds: Holds::Body, is: |s| s.zip(".npy"),
         advice: "make it glTF with Blender's SMPL add-on, or a rig file from its arrays (docs/howto/bodies.md)" },
-    Other { name: "a NumPy array", joints: false, is: |s| s.is(b"\x93NUMPY"), advice: "read it with depth(…) or mask(…)" },
-    Other { name: "HDF5", joints: false, is: |s| s.is(b"\x89HDF"), advice: "write its vertices and faces as PLY" },
-    Other { name: "MATLAB data", joints: false, is: |s| s.is(b"MATLAB 5.0"), advice: "write its vertices and faces as PLY" },
-    Other { name: "a picture", joints: false, is: |s| image::guess_format(s.bytes).is_ok() || s.xml("<svg"), advice: PICTURE },
-    Other { name: "an OBJ file's materials (MTL)", joints: false, is: |s| s.says("newmtl"), advice: "give the `.obj` file beside it" },
-    Other { name: "a web page", joints: false, is: |s| s.says("<!doctype html") || s.says("<html"),
+    Other { name: "a NumPy array", holds: Holds::Other, is: |s| s.is(b"\x93NUMPY"), advice: "read it with depth(…) or mask(…)" },
+    Other { name: "HDF5", holds: Holds::Other, is: |s| s.is(b"\x89HDF"), advice: "write its vertices and faces as PLY" },
+    Other { name: "MATLAB data", holds: Holds::Other, is: |s| s.is(b"MATLAB 5.0"), advice: "write its vertices and faces as PLY" },
+    Other { name: "a picture", holds: Holds::Other, is: |s| image::guess_format(s.bytes).is_ok() || s.xml("<svg"), advice: PICTURE },
+    Other { name: "an OBJ file's materials (MTL)", holds: Holds::Other, is: |s| s.says("newmtl"), advice: "give the `.obj` file beside it" },
+    Other { name: "a web page", holds: Holds::Other, is: |s| s.says("<!doctype html") || s.says("<html"),
         advice: "download the file itself, not its page" },
-    Other { name: "a pointer of Git LFS", joints: false, is: |s| s.says("version https://git-lfs"),
+    Other { name: "a pointer of Git LFS", holds: Holds::Other, is: |s| s.says("version https://git-lfs"),
         advice: "get the file itself by `git lfs pull`" },
-    Other { name: "compressed (gzip)", joints: false, is: |s| s.is(b"\x1f\x8b"), advice: "unpack it by `gunzip FILE`" },
-    Other { name: "a ZIP archive", joints: false, is: |s| s.is(b"PK\x03\x04"), advice: "unpack it and give the mesh in it" },
-    Other { name: "text in UTF-16", joints: false, is: |s| s.is(b"\xff\xfe") || s.is(b"\xfe\xff"), advice: "save it as UTF-8" },
-    Other { name: "empty", joints: false, is: |s| s.text.is_empty(), advice: "give a glTF, OBJ, STL or PLY file" },
+    Other { name: "compressed (gzip)", holds: Holds::Other, is: |s| s.is(b"\x1f\x8b"), advice: "unpack it by `gunzip FILE`" },
+    Other { name: "a ZIP archive", holds: Holds::Other, is: |s| s.is(b"PK\x03\x04"), advice: "unpack it and give the mesh in it" },
+    Other { name: "text in UTF-16", holds: Holds::Other, is: |s| s.is(b"\xff\xfe") || s.is(b"\xfe\xff"), advice: "save it as UTF-8" },
+    Other { name: "empty", holds: Holds::Other, is: |s| s.text.is_empty(), advice: "give a glTF, OBJ, STL or PLY file" },
 ];
 
 /// Binary data of no known kind.
 static UNKNOWN: Other = Other {
     name: "of an unknown kind",
-    is: |s| s.bytes.contains(&0),
-    joints: true,
+    holds: Holds::Other,
+    is: |_| true,
     advice: "meshes are glTF, OBJ, STL or PLY files; Blender, MeshLab or `assimp export` convert others",
 };
 
-/// Finds the kind of a file by its first bytes; what has none that are known is OBJ, unless its
-/// name ends in `.stl`.
+/// Finds the kind of a file by its first bytes; what has none that are known is OBJ if it has
+/// vertices or its name says so.
 pub(super) fn kind(file: &str, bytes: &[u8]) -> Kind {
     let head = &bytes[..bytes.len().min(4096)];
     let plain = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
@@ -194,9 +206,16 @@ pub(super) fn kind(file: &str, bytes: &[u8]) -> Kind {
     match KINDS.iter().find(|k| (k.is)(&start)) {
         Some(other) => Kind::Other(other),
         None if ends(".stl") => Kind::Stl,
-        None if (UNKNOWN.is)(&start) => Kind::Other(&UNKNOWN),
-        None => Kind::Obj,
+        None if ends(".obj") || has_vertices(bytes) => Kind::Obj,
+        None => Kind::Other(&UNKNOWN),
     }
+}
+
+/// Whether a line starts as a vertex of OBJ does.
+fn has_vertices(bytes: &[u8]) -> bool {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let starts = |line: &[u8]| matches!(line.trim_ascii_start(), [b'v', b' ' | b'\t', ..]);
+    bytes.split(|b| matches!(b, b'\n' | b'\r')).any(starts)
 }
 
 #[cfg(test)]
@@ -213,7 +232,7 @@ mod tests {
 
     /// The name of a kind that is not read.
     fn other(bytes: &[u8]) -> &'static str {
-        match kind("a.obj", bytes) {
+        match kind("a", bytes) {
             Kind::Other(other) => other.name,
             known => panic!("{known:?}"),
         }
@@ -235,7 +254,7 @@ mod tests {
             (b"ISO-10303-21;\nHEADER;", "STEP (CAD)"),
             (iges.as_bytes(), "IGES (CAD)"),
             (b"OFF\n8 6 0\n", "OFF"),
-            (b"COFF 8 6 0\n", "OFF"),
+            (b"NCOFF\n8 6 0\n", "OFF"),
             (&zip("[Content_Types].xml", b"\0\x003D/3dmodel.model\0"), "3MF"),
             (&three_ds, "3DS"),
             (b"<?xml?><X3D version='3.0'>", "X3D"),
@@ -255,7 +274,8 @@ mod tests {
             assert_eq!(other(bytes), name);
         }
         let is_obj = |text: &str| matches!(kind("a", text.as_bytes()), Kind::Obj);
-        assert!(is_obj("# offset\no solid\nv 0 0 0\n") && is_obj("\u{feff}mtllib a\n"));
+        assert!(is_obj("# offset\no solid\nv 0 0 0\n") && is_obj("\u{feff}v 0 0 0\r\n"));
+        assert!(matches!(kind("a.OBJ", b"nothing"), Kind::Obj));
         assert!(matches!(kind("a.STL", b"\0 a header \0"), Kind::Stl));
         assert!(matches!(kind("a", b"solid\n facet normal"), Kind::Stl));
         assert!(matches!(kind("a", b"ply\r\nformat"), Kind::Ply));
@@ -271,6 +291,7 @@ mod tests {
         );
         let body = |bytes: &[u8]| not_an_armature("a", bytes).unwrap();
         assert!(body(b"; FBX 7.3.0").ends_with("`assimp export FILE FILE.glb`"));
+        assert!(!body(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").contains("autorig"));
         assert!(body(b"OFF\n").contains("FILE.ply") && body(b"OFF\n").contains("scene.autorig"));
         assert!(body(b"v 0 0 0\n").starts_with("an OBJ file has no joints; read it with mesh"));
         assert_eq!(not_an_armature("a", b"{}"), None);
