@@ -10,3 +10,4 @@ mod caches;
 mod drawing;
 mod gltf;
 mod keypoints;
+mod meshes;

@@ -17,13 +17,10 @@ const FLAT: f64 = 1e-9;
 /// Turns over the closed bodies that are inside out. `triangles` are indices into
 /// `positions`. Returns what users should know of it, if any were turned.
 pub fn face_outward(positions: &[Vec3], triangles: &mut [[u32; 3]]) -> Option<String> {
-    let faces = |of: &[u32]| -> Vec<[DVec3; 3]> {
-        let at = |v: u32| positions[v as usize].as_dvec3();
-        of.iter().map(|f| triangles[*f as usize].map(at)).collect()
-    };
+    let corners = |face: &u32| triangles[*face as usize].map(|v| positions[v as usize].as_dvec3());
     let mut bodies: Vec<Body> = closed(&weld(positions), triangles)
         .into_iter()
-        .filter_map(|numbers| Body::new(&faces(&numbers), numbers))
+        .filter_map(|faces| Body::new(faces, corners))
         .collect();
     if bodies.iter().all(|b| b.volume > 0.0) {
         return None;
@@ -31,18 +28,18 @@ pub fn face_outward(positions: &[Vec3], triangles: &mut [[u32; 3]]) -> Option<St
     // What encloses a body comes before it.
     let extent = |b: &Body| b.bounds.size().element_product();
     bodies.sort_by(|a, b| extent(b).total_cmp(&extent(a)));
-    let (mut outer, mut work): (Vec<(&Body, Vec<[DVec3; 3]>)>, usize) = (Vec::new(), 0);
+    let (mut outer, mut work): (Vec<&Body>, usize) = (Vec::new(), 0);
     let mut wrong: Vec<&Body> = Vec::new();
     for body in &bodies {
-        let around = outer.iter().find(|(o, surface)| {
+        let around = outer.iter().find(|o| {
             work += 1;
             o.may_enclose(body)
                 && body.extremes.iter().all(|p| {
-                    work += surface.len();
-                    work < MOST_WORK && winds_around(surface, *p)
+                    work += o.faces.len();
+                    work < MOST_WORK && winds_around(o.faces.iter().map(corners), *p)
                 })
         });
-        let outermost = around.map_or(body, |(o, _)| *o);
+        let outermost = around.copied().unwrap_or(body);
         if work >= MOST_WORK {
             break;
         }
@@ -50,7 +47,7 @@ pub fn face_outward(positions: &[Vec3], triangles: &mut [[u32; 3]]) -> Option<St
             wrong.push(body);
         }
         if around.is_none() {
-            outer.push((body, faces(&body.faces)));
+            outer.push(body);
         }
     }
     let count = wrong.len();
@@ -80,11 +77,11 @@ struct Body {
 
 impl Body {
     /// `None` without a volume: a sheet with two sides.
-    fn new(surface: &[[DVec3; 3]], faces: Vec<u32>) -> Option<Body> {
-        let corners = || surface.iter().flatten().copied();
+    fn new(faces: Vec<u32>, of: impl Fn(&u32) -> [DVec3; 3]) -> Option<Body> {
+        let corners = || faces.iter().flat_map(&of);
         let (origin, bounds) = (corners().next()?, Bounds::around(corners())?);
         let (mut volume, mut area) = (0.0, 0.0);
-        for [a, b, c] in surface.iter().map(|t| t.map(|p| p - origin)) {
+        for [a, b, c] in faces.iter().map(|f| of(f).map(|p| p - origin)) {
             volume += a.dot(b.cross(c)) / 6.0;
             area += (b - a).cross(c - a).length() / 2.0;
         }
@@ -111,14 +108,14 @@ impl Body {
 
 /// Returns whether a closed surface goes around a point: the sum of its solid angles (Van
 /// Oosterom and Strackee 1983) is then 4 pi, or -4 pi.
-fn winds_around(surface: &[[DVec3; 3]], point: DVec3) -> bool {
-    let half_angle = |t: &[DVec3; 3]| {
+fn winds_around(surface: impl Iterator<Item = [DVec3; 3]>, point: DVec3) -> bool {
+    let half_angle = |t: [DVec3; 3]| {
         let [a, b, c] = t.map(|p| p - point);
         let (x, y, z) = (a.length(), b.length(), c.length());
         let below = x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y;
         libm::atan2(a.dot(b.cross(c)), below)
     };
-    surface.iter().map(half_angle).sum::<f64>().abs() > std::f64::consts::PI
+    surface.map(half_angle).sum::<f64>().abs() > std::f64::consts::PI
 }
 
 /// Returns the faces of each closed body, in the order of their first faces.
