@@ -1,5 +1,5 @@
 //! Meshes as programs read them: bodies that are inside out, other people's kinds of files, and
-//! joints whose names are no names of the language.
+//! joints whose names are not names of the language.
 
 use crate::common::folder::Folder;
 
@@ -18,8 +18,8 @@ fn compile(folder: &Folder, text: &str) -> Result<Model, String> {
     Program::open(path.to_str().unwrap()).and_then(Program::compile).map_err(|e| e.to_string())
 }
 
-/// The log likelihood of a program that observes what is true with a standard deviation of 1, for
-/// each of so many observations.
+/// Checks that a program observes what is true: each of its observations, with a standard
+/// deviation of 1, is at the mode.
 fn is_true(folder: &Folder, text: &str, observations: usize) {
     let model = compile(folder, text).unwrap();
     let l = model.simulate(1, 0).unwrap_or_else(|e| panic!("{e}")).log_likelihood();
