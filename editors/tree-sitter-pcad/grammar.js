@@ -286,9 +286,11 @@ export default grammar({
 
     array: $ => seq("[", comma($.expression), "]"),
 
-    record: $ => seq("{", comma1($.record_field), "}"),
+    record: $ => seq("{", comma($.record_field), "}"),
 
-    record_field: $ => seq(field("name", $._any_name), ":", field("value", $.expression)),
+    record_field: $ => seq(
+      field("name", choice($._any_name, $.string)), ":", field("value", $.expression),
+    ),
 
     _literal: $ => choice($.number, $.string, $.boolean),
 

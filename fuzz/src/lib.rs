@@ -16,7 +16,10 @@ use pcadlang_inference::draws::{Column, DrawRow, Sink};
 use pcadlang_inference::{Checkpoint, Progress};
 use pcadlang_numerics::num::fnv1a;
 use pcadlang_report::checkpoint::SavedChain;
-use pcadlang_scene::geom::{FileFrame, UpAxis, gltf as gltf_file, obj as obj_file};
+use pcadlang_scene::geom::{
+    FileFrame, MeshFile, UpAxis, gltf as gltf_file, obj as obj_file, ply as ply_file,
+    stl as stl_file,
+};
 use pcadlang_scene::render::Camera;
 use pcadlang_scene::vision::features::Query;
 use pcadlang_scene::vision::keypoints::People;
@@ -121,6 +124,28 @@ pub fn obj(bytes: &[u8]) {
         assert!(again.is_ok_and(|m| m.topology.triangles.len() == mesh.topology.triangles.len()));
         data("mesh", "x.obj", bytes, &[]);
     }
+}
+
+/// Tests a mesh in STL, binary or as text.
+pub fn stl(bytes: &[u8]) {
+    mesh_file(stl_file::indexed(bytes).ok());
+    data("mesh", "x.stl", bytes, &[]);
+}
+
+/// Tests a mesh in PLY, binary or as text.
+pub fn ply(bytes: &[u8]) {
+    mesh_file(ply_file::indexed(bytes).ok());
+    data("mesh", "x.ply", bytes, &[]);
+}
+
+/// Tests that what was read is sound, and stays so when what is inside out is turned over.
+fn mesh_file(file: Option<MeshFile>) {
+    let Some(file) = file else { return };
+    assert!(file.triangles.iter().flatten().all(|v| (*v as usize) < file.positions.len()));
+    assert_eq!(file.parts.len(), file.triangles.len());
+    let again = file.outward().outward();
+    assert!(again.remarks.len() <= 1);
+    let _ = again.mesh();
 }
 
 /// Tests a glTF file in either form; every file beside it is one small buffer.

@@ -52,7 +52,7 @@ macro_rules! targets {
     };
 }
 
-targets! { program_text program obj gltf rig image array camera trace bank checkpoint keypoints table network graph_model studio }
+targets! { program_text program obj stl ply gltf rig image array camera trace bank checkpoint keypoints table network graph_model studio }
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -81,6 +81,45 @@ fn read(path: impl AsRef<Path>) -> Vec<u8> {
 fn encoded(picture: impl Into<DynamicImage>, format: ImageFormat) -> Vec<u8> {
     let mut bytes = Vec::new();
     picture.into().write_to(&mut Cursor::new(&mut bytes), format).unwrap();
+    bytes
+}
+
+/// Two triangles, in a file whose header begins as a text's would.
+fn binary_stl() -> Vec<u8> {
+    let mut bytes = b"solid made by a program".to_vec();
+    bytes.resize(80, 0);
+    bytes.extend(2u32.to_le_bytes());
+    for corners in [[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0f32], [0.5; 9]] {
+        let normal = [0.0, 0.0, 1.0];
+        bytes.extend(normal.into_iter().chain(corners).flat_map(f32::to_le_bytes));
+        bytes.extend([0, 0]);
+    }
+    bytes
+}
+
+/// A square of one polygon, and a strip.
+fn ply(format: &str) -> Vec<u8> {
+    let mut bytes = format!(
+        "ply\nformat {format} 1.0\ncomment a\nelement vertex 4\nproperty float x\nproperty float y\n\
+         property float z\nproperty uchar red\nelement face 1\nproperty list uchar int vertex_indices\n\
+         element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+    )
+    .into_bytes();
+    let number = |x: f32, size: usize| match (format, size) {
+        ("ascii", _) => format!("{x} ").into_bytes(),
+        (_, 1) => vec![x as u8],
+        ("binary_little_endian", 4) => (x as i32).to_le_bytes().to_vec(),
+        (_, 4) => (x as i32).to_be_bytes().to_vec(),
+        ("binary_little_endian", _) => x.to_le_bytes().to_vec(),
+        _ => x.to_be_bytes().to_vec(),
+    };
+    for (x, y) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
+        bytes.extend([number(x, 0), number(y, 0), number(0.0, 0), number(200.0, 1)].concat());
+    }
+    bytes.extend(number(4.0, 1));
+    for x in [0.0, 1.0, 2.0, 3.0, 5.0, 0.0, 1.0, 2.0, -1.0, 3.0] {
+        bytes.extend(number(x, 4));
+    }
     bytes
 }
 
@@ -243,6 +282,13 @@ fn seeds_of(target: &str) -> Vec<Vec<u8>> {
             folders.iter().flat_map(|d| files(&root().join(d), ".pcad")).map(read).collect()
         }
         "obj" => texts(&[OBJ, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"]),
+        "stl" => vec![
+            b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e0 0\n\
+              endloop\nendfacet\nendsolid a\n"
+                .to_vec(),
+            binary_stl(),
+        ],
+        "ply" => ["ascii", "binary_little_endian", "binary_big_endian"].map(ply).to_vec(),
         "gltf" => bodies(),
         "rig" => vec![
             RIG.into(),
@@ -333,7 +379,7 @@ fn changed(seed: &[u8], x: &mut u64) -> Vec<u8> {
 /// Each target accepts its seeds, and each seed is valid, so that its mutations get
 /// beyond the first check.
 fn accepts_its_seeds(name: &str, target: Target) {
-    use pcadlang_scene::geom::{FileFrame, gltf::load, obj};
+    use pcadlang_scene::geom::{FileFrame, gltf::load, obj, ply, stl};
     use pcadlang_scene::render::Camera;
     use pcadlang_scene::vision::{Limits, depth, keypoints::People, photo};
     let all = seeds_of(name);
@@ -343,6 +389,8 @@ fn accepts_its_seeds(name: &str, target: Target) {
         let text = || std::str::from_utf8(seed).unwrap();
         let good = match name {
             "obj" => obj::load(seed).is_ok(),
+            "stl" => stl::indexed(seed).is_ok(),
+            "ply" => ply::indexed(seed).is_ok(),
             // One of them has an external buffer.
             "gltf" => {
                 load(seed, &FileFrame::default(), Default::default(), &|_| Err("beside".into()))

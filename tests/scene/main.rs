@@ -12,3 +12,4 @@ mod drawing;
 mod gltf;
 mod gltf_shapes;
 mod keypoints;
+mod meshes;

@@ -9,7 +9,7 @@ use pcadlang_engine::trace::Draws;
 use pcadlang_inference::RunOptions;
 use pcadlang_library::scene::ArmatureValue;
 use pcadlang_library::{Program, shipped, standard};
-use pcadlang_scene::geom::obj;
+use pcadlang_scene::geom::{MeshFile, obj};
 use std::fmt::Write;
 
 const SIDES: usize = 10;
@@ -138,6 +138,25 @@ fn its_groups_become_its_limbs() {
         let head = joints[body.rig().find(name).unwrap()].head;
         assert!((head - *a).length() < 1.2 * ra, "{name} turns at {head}, begins at {a}");
     }
+}
+
+#[test]
+fn inside_out_it_is_the_same() {
+    let flip = |line: &str| match line.split(' ').collect::<Vec<_>>()[..] {
+        ["f", a, b, c] => format!("f {a} {c} {b}\n"),
+        _ => format!("{line}\n"),
+    };
+    let flipped: String = dog().lines().map(flip).collect();
+    let file = MeshFile::read("dog.obj", flipped.as_bytes()).unwrap().outward();
+    assert!(
+        file.remarks[0].starts_with("all 14 closed bodies are inside out"),
+        "{:?}",
+        file.remarks
+    );
+    let body = pcadlang_autorig::by_groups(&file.mesh().unwrap()).unwrap();
+    let corner = |t: &[u32; 3]| t.map(|v| body.positions()[v as usize].as_dvec3());
+    let volume = |[a, b, c]: [DVec3; 3]| a.dot(b.cross(c)) / 6.0;
+    assert!(body.triangles().iter().map(corner).map(volume).sum::<f64>() > 0.3);
 }
 
 #[test]

@@ -223,21 +223,39 @@ fn add_levels(v: &Value, levels: &mut Vec<String>) {
 fn find<'a>(values: &'a [(String, Value)], column: &str) -> Option<Cow<'a, Value>> {
     values.iter().find_map(|(name, v)| {
         let rest = column.strip_prefix(name.as_str())?;
-        if rest.is_empty() {
-            return Some(Cow::Borrowed(v));
+        match rest {
+            "" => Some(Cow::Borrowed(v)),
+            rest => within(Cow::Borrowed(v), rest.strip_prefix('/')?),
         }
-        let mut fields = rest.strip_prefix('/')?.split('/');
-        fields.try_fold(Cow::Borrowed(v), |v, field| {
-            if let Some((first, all)) = records(&v) {
-                return first.contains_key(field).then(|| Cow::Owned(gathered(all, field)));
-            }
-            match v {
-                Cow::Borrowed(Value::Record(r)) => r.get(field).map(Cow::Borrowed),
-                Cow::Owned(Value::Record(r)) => r.get(field).cloned().map(Cow::Owned),
-                _ => None,
-            }
-        })
     })
+}
+
+/// Finds what is at a path of fields. A name in quotes may have a `/` in it.
+fn within<'a>(v: Cow<'a, Value>, path: &str) -> Option<Cow<'a, Value>> {
+    let field = |name: &str| {
+        if let Some((first, all)) = records(&v) {
+            return first.contains_key(name).then(|| Cow::Owned(gathered(all, name)));
+        }
+        match &v {
+            Cow::Borrowed(Value::Record(r)) => r.get(name).map(Cow::Borrowed),
+            Cow::Owned(Value::Record(r)) => r.get(name).cloned().map(Cow::Owned),
+            _ => None,
+        }
+    };
+    let below = |name: &str| {
+        let v = field(name)?;
+        match path.strip_prefix(name)? {
+            "" => Some(v),
+            rest => within(v, rest.strip_prefix('/')?),
+        }
+    };
+    let record = match (records(&v), &*v) {
+        (Some((first, _)), _) => Some(first),
+        (None, Value::Record(r)) => Some(&**r),
+        _ => None,
+    };
+    let mut slashed = record.into_iter().flat_map(|r| r.keys()).filter(|k| k.contains('/'));
+    below(path.split('/').next().unwrap_or_default()).or_else(|| slashed.find_map(|k| below(k)))
 }
 
 /// Writes the numbers of a value to their places in an array of these dimensions. Returns

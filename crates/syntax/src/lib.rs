@@ -38,6 +38,7 @@ pub use error::{AddressError, MAX_ERRORS, MAX_NESTING, MAX_TOKENS, SyntaxError, 
 pub use format::{WIDTH, format, print, print_expr};
 pub use parse::{parse, parse_expr};
 pub use statements::{Place, STATEMENTS, Statement};
+pub use string::record_key;
 pub use token::{KEYWORDS, is_keyword, is_name, keywords};
 
 lalrpop_util::lalrpop_mod!(

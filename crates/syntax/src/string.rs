@@ -2,6 +2,8 @@
 
 use super::error::SyntaxErrorKind;
 use super::scan::Lexer;
+use super::token::is_name;
+use std::borrow::Cow;
 use std::fmt::Write;
 use std::sync::Arc;
 
@@ -62,6 +64,11 @@ fn unicode_escape(text: &str) -> (Option<char>, usize) {
     }
 }
 
+/// Formats the key of a record: in quotes, unless it is a name.
+pub fn record_key(key: &str) -> Cow<'_, str> {
+    if is_name(key) { Cow::Borrowed(key) } else { Cow::Owned(quote(key)) }
+}
+
 /// Formats a string as a literal of the language.
 pub(super) fn quote(text: &str) -> String {
     let mut quoted = String::with_capacity(text.len() + 2);
@@ -81,4 +88,27 @@ pub(super) fn quote(text: &str) -> String {
     }
     quoted.push('"');
     quoted
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{format, parse_expr, print_expr, span::FileId};
+
+    #[test]
+    fn keys_of_records_may_be_in_quotes() {
+        let printed = |text: &str| print_expr(&parse_expr(text, FileId(0)).unwrap());
+        assert_eq!(
+            printed(r#"{ "mixamorig:LeftArm": 1, "x": 2, if: 3, "": {}, "a\"b": 4, }"#),
+            r#"{ "mixamorig:LeftArm": 1, x: 2, if: 3, "": {}, "a\"b": 4 }"#
+        );
+        assert_eq!(printed("f({})"), "f({})");
+        // The formatter leaves quotes as they are written.
+        assert_eq!(
+            format("let a={\"x\":1,\"upperarm01.L\":{  }};").unwrap(),
+            "let a = { \"x\": 1, \"upperarm01.L\": {} };\n"
+        );
+        assert!(parse_expr("{ 1: 2 }", FileId(0)).is_err());
+        // Braces after a head are a block, as before.
+        assert!(format("fn f() {} for i in {} {} fn g(x) { if x {} else {} {} }").is_ok());
+    }
 }

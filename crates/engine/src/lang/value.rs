@@ -14,6 +14,7 @@ use super::ids::{BlockId, FrameId, NodeId};
 use indexmap::IndexMap;
 use pcadlang_numerics::dist::{Datum, Dist};
 use pcadlang_numerics::rng::Stream;
+use pcadlang_syntax::record_key;
 use std::any::Any;
 use std::fmt;
 use std::sync::Arc;
@@ -450,10 +451,11 @@ impl fmt::Display for Value {
             Value::Str(s) => write!(f, "{s:?}"),
             Value::Array(xs) => write_list(f, xs, |f, x| write!(f, "{x}")),
             Value::List(xs) => write_list(f, xs, |f, x| write!(f, "{x}")),
+            Value::Record(r) if r.is_empty() => write!(f, "{{}}"),
             Value::Record(r) => {
                 write!(f, "{{ ")?;
                 for (i, (k, v)) in r.iter().enumerate() {
-                    write!(f, "{}{k}: {v}", if i > 0 { ", " } else { "" })?;
+                    write!(f, "{}{}: {v}", if i > 0 { ", " } else { "" }, record_key(k))?;
                 }
                 write!(f, " }}")
             }
@@ -472,6 +474,14 @@ impl fmt::Display for Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn keys_that_are_no_names_are_shown_in_quotes() {
+        let record = |k: &str| Value::Record(Arc::new([(Arc::from(k), Value::Num(1.0))].into()));
+        assert_eq!(record("upperarm01.L").to_string(), "{ \"upperarm01.L\": 1 }");
+        assert_eq!(record("if").to_string(), "{ if: 1 }");
+        assert_eq!(Value::Record(Arc::default()).to_string(), "{}");
+    }
 
     #[test]
     fn depth_and_size_are_bounded_where_they_are_said_to_be() {

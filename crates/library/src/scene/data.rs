@@ -12,7 +12,9 @@ use pcadlang_engine::lang::builtins::{Arg, Default, Row, Type, arg, flag, num, o
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::geom::armature::{Armature, morphs_from_json, rig_from_json};
-use pcadlang_scene::geom::{FileFrame, GeomError, Solid, UpAxis, gltf, obj};
+use pcadlang_scene::geom::{
+    FileFrame, GeomError, MeshFile, Solid, UpAxis, face_outward, gltf, not_an_armature,
+};
 use pcadlang_scene::vision::keypoints::{self, Keypoints, People};
 use pcadlang_scene::vision::{ContourMap, Limits, VisionError, depth, mask, photo};
 use std::sync::Arc;
@@ -157,9 +159,10 @@ pub(super) const TABLE: &[Row] = &[
         "mesh",
         &[PATH, UP, UNIT, MESH_POSE],
         Type::Object("a solid"),
-        "A Wavefront OBJ mesh, each object or group a part, or the default scene of a glTF file \
-         (`.glb`, `.gltf`), each node with a mesh a part.",
-        || Arc::new(Shape { load: mesh, example: "mesh(\"file.glb\", up = \"z\", unit = 0.01)" }),
+        "A mesh: OBJ, each object or group a part; STL; PLY; or the default scene of a glTF file \
+         (`.glb`, `.gltf`), each node with a mesh a part. Closed bodies that are inside out are \
+         turned over, and said.",
+        || Arc::new(Shape { load: mesh, example: "mesh(\"file.stl\", up = \"z\", unit = 0.001)" }),
     ),
 ];
 
@@ -313,18 +316,22 @@ fn mesh(file: &str, bytes: &[u8], how: &As, beside: &ReadRelative) -> Result<Val
         |mesh, remarks| Value::object(SolidValue::read(Solid::new(Arc::new(mesh)), remarks));
     if gltf::is_gltf(file, bytes) {
         let pose = how.pose.unwrap_or(gltf::Pose::File);
-        let mut loaded = gltf::load(bytes, &how.frame, pose, beside)?;
+        let mut loaded = gltf::load(bytes, &how.frame, pose, beside)?.outward();
         let remarks = std::mem::take(&mut loaded.remarks);
         return Ok(value(loaded.mesh()?, remarks));
     }
-    Ok(value(obj::load_in(bytes, &how.frame)?, Vec::new()))
+    let mut read = MeshFile::read(file, bytes)?.placed(&how.frame).outward();
+    let remarks = std::mem::take(&mut read.remarks);
+    Ok(value(read.mesh()?, remarks))
 }
 
 /// Reads a glTF file, or a rig, its mesh, and its morphs if it names some.
 fn armature(file: &str, bytes: &[u8], how: &As, beside: &ReadRelative) -> Result<Value, GeomError> {
     let invalid = |why: &str| GeomError::Invalid(why.to_owned());
+    let value = |body: Armature, remarks| Value::object(ArmatureValue::read(body, remarks));
     if gltf::is_gltf(file, bytes) {
-        let mut loaded = gltf::load(bytes, &how.frame, how.pose.unwrap_or_default(), beside)?;
+        let pose = how.pose.unwrap_or_default();
+        let mut loaded = gltf::load(bytes, &how.frame, pose, beside)?.outward();
         if loaded.rig.is_none() {
             return Err(invalid(
                 "the glTF file has no skin, so it does not define which joint moves which \
@@ -332,7 +339,10 @@ fn armature(file: &str, bytes: &[u8], how: &As, beside: &ReadRelative) -> Result
             ));
         }
         let remarks = std::mem::take(&mut loaded.remarks);
-        return Ok(Value::object(ArmatureValue::read(loaded.armature()?, remarks)));
+        return Ok(value(loaded.armature()?, remarks));
+    }
+    if let Some(why) = not_an_armature(file, bytes) {
+        return Err(GeomError::Invalid(why));
     }
     if how.frame != FileFrame::default() || how.pose.is_some() {
         return Err(invalid(
@@ -343,14 +353,15 @@ fn armature(file: &str, bytes: &[u8], how: &As, beside: &ReadRelative) -> Result
     let file = rig_from_json(bytes)?;
     let within = |path: &str, e: GeomError| GeomError::Invalid(format!("{path}: {e}"));
     let read = |path: &str| beside(path).map_err(GeomError::Invalid);
-    let mesh = obj::indexed(&read(&file.mesh)?).map_err(|e| within(&file.mesh, e))?;
+    let mesh = MeshFile::read(&file.mesh, &read(&file.mesh)?).map_err(|e| within(&file.mesh, e))?;
+    let mesh = mesh.outward();
     let rig = file.rig.clone();
     let mut body = Armature::new(file.rig, mesh.positions, mesh.triangles, file.influences)?;
     if let Some(path) = &file.morphs {
         let morphs = morphs_from_json(&read(path)?, &rig).map_err(|e| within(path, e))?;
         body = body.with_morphs(morphs).map_err(|e| within(path, e))?;
     }
-    Ok(Value::object(ArmatureValue::new(body)))
+    Ok(value(body, mesh.remarks))
 }
 
 /// A person's joints; `#ID` after the path selects the person.

@@ -1,29 +1,30 @@
-//! Wavefront OBJ: reading, and writing. `tobj` parses the text, after a check that
-//! reports errors by line.
+//! Wavefront OBJ: reading, and writing.
 //!
-//! Materials, colours, texture coordinates and the file's own normals are ignored;
-//! [`Mesh::new`] computes normals. Invariant: `tobj` sees only finite vertices and faces
-//! whose corners exist, so no input can cause a panic.
+//! Polygons are cut into triangles (`polygon.rs`). Materials, colours, texture coordinates
+//! and the file's own normals are ignored; [`Mesh::new`] computes normals. Invariant: every
+//! vertex is finite and every corner of a face exists, so no input can cause a panic.
 
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
+use super::mesh_file::MeshFile;
+use super::polygon::{Cutter, MOST_CORNERS};
 use super::{FileFrame, GeomError, Mesh, Object};
 use glam::Vec3;
-use rustc_hash::FxHashMap;
+use indexmap::IndexSet;
+use std::borrow::Cow;
 use std::fmt::Write;
 use std::sync::Arc;
 
-/// The maximum number of corners of a polygon.
-const MOST_CORNERS: usize = 1000;
+/// Statements of free-form curves and surfaces, and of what they are made.
+const FREE_FORM: [&str; 4] = ["curv", "curv2", "surf", "vp"];
 
 /// Reads a mesh. Each object or group of the file is a part with its name, numbered by
-/// first use; reopening one continues it. Polygons are cut into triangle fans. A fourth
-/// coordinate divides the others.
+/// first use; reopening one continues it. A fourth coordinate divides the others.
 ///
 /// # Errors
-/// [`GeomError::Invalid`] if the file is not text, has no faces, or none of them has
-/// positive area. With the line number, if a line is malformed, a coordinate is not
-/// finite, a face uses a vertex that is not defined before it, or there are more than
-/// 65535 parts or five million triangles.
+/// [`GeomError::Invalid`] if the file has no faces, or none of them has positive area. With
+/// the line number, if a line is malformed, a coordinate is not finite, a face uses a vertex
+/// that is not defined before it, or there are more than 65535 parts or five million
+/// triangles.
 pub fn load(bytes: &[u8]) -> Result<Mesh, GeomError> {
     load_in(bytes, &FileFrame::default())
 }
@@ -33,149 +34,100 @@ pub fn load(bytes: &[u8]) -> Result<Mesh, GeomError> {
 /// # Errors
 /// As [`load`], and if a coordinate is not finite in scene units.
 pub fn load_in(bytes: &[u8], frame: &FileFrame) -> Result<Mesh, GeomError> {
-    let (plain, names) = plain(text(bytes)?)?;
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        single_index: false,
-    };
-    let no_materials = |_: &std::path::Path| Ok((Vec::new(), Default::default()));
-    let unreadable =
-        |e: &dyn std::fmt::Display| GeomError::invalid(format!("cannot read the OBJ file: {e}"));
-    let (models, _) = tobj::load_obj_buf(&mut plain.as_bytes(), &options, no_materials)
-        .map_err(|e| unreadable(&e))?;
-    let (mut positions, mut triangles, mut parts) = (Vec::new(), Vec::new(), Vec::new());
-    for m in models.iter().filter(|m| !m.mesh.indices.is_empty()) {
-        let part: u16 = m.name.parse().map_err(|e| unreadable(&e))?;
-        let first = positions.len() as u32;
-        positions.extend(
-            m.mesh
-                .positions
-                .chunks_exact(3)
-                .map(|p| frame.apply(Vec3::from_slice(p).as_dvec3()).as_vec3()),
-        );
-        triangles.extend(
-            m.mesh.indices.chunks_exact(3).map(|t| [t[0] + first, t[1] + first, t[2] + first]),
-        );
-        parts.resize(triangles.len(), part);
-    }
-    if triangles.is_empty() {
-        return Err(GeomError::invalid("the OBJ file has no faces"));
-    }
-    let mut mesh = Mesh::new(positions, triangles, parts)?;
-    Arc::make_mut(&mut mesh.topology).part_names = names;
-    Ok(mesh)
-}
-
-/// Vertices and triangles with the file's own numbering, and the object or group of each
-/// triangle.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Indexed {
-    /// The vertices in the file's order, whether used or not.
-    pub positions: Vec<Vec3>,
-    /// The triangles; polygons are cut into fans.
-    pub triangles: Vec<[u32; 3]>,
-    /// The number of each triangle's object or group, in order of first use.
-    pub parts: Vec<u16>,
-    /// The names of objects and groups by number; empty for faces before the first of
-    /// them.
-    pub part_names: Vec<Arc<str>>,
+    indexed(bytes)?.placed(frame).mesh()
 }
 
 /// Reads a mesh with the file's own vertex indices, which skin weights refer to.
 ///
 /// # Errors
 /// As [`load`], except that triangles without area are kept.
-pub fn indexed(bytes: &[u8]) -> Result<Indexed, GeomError> {
-    let (plain, names) = plain(text(bytes)?)?;
-    let (mut out, mut part) = (Indexed { part_names: names, ..Indexed::default() }, 0u16);
-    for line in plain.lines() {
-        let mut words = line.split(' ');
-        // The lines are the output of `plain`, so every word parses as a number.
-        match words.next() {
-            Some("v") => {
-                let mut number = || words.next().and_then(|w| w.parse().ok()).unwrap_or(0.0f32);
-                out.positions.push(Vec3::new(number(), number(), number()));
-            }
-            Some("g") => part = words.next().and_then(|w| w.parse().ok()).unwrap_or(part),
-            Some("f") => {
-                let corners: Vec<u32> =
-                    words.filter_map(|w| w.parse::<u32>().ok()?.checked_sub(1)).collect();
-                for pair in corners.get(1..).unwrap_or_default().windows(2) {
-                    out.triangles.push([corners[0], pair[0], pair[1]]);
-                    out.parts.push(part);
-                }
-            }
-            _ => {}
-        }
-    }
-    if out.triangles.is_empty() {
-        return Err(GeomError::invalid("the OBJ file has no faces"));
-    }
-    Ok(out)
-}
-
-fn text(bytes: &[u8]) -> Result<&str, GeomError> {
-    std::str::from_utf8(bytes).map_err(|e| {
-        GeomError::invalid(format!("the OBJ file is not text (byte {})", e.valid_up_to()))
-    })
-}
-
-/// Checks a file line by line. Returns its vertices, its faces with absolute vertex
-/// indices, and its parts as `g` with a number, and the names of the parts.
-fn plain(text: &str) -> Result<(String, Vec<Arc<str>>), GeomError> {
-    let mut out = String::with_capacity(text.len());
-    let (mut vertices, mut triangles) = (0i64, 0usize);
-    let mut names: FxHashMap<&str, usize> = FxHashMap::default();
-    let (mut name, mut open) = ("", None);
-    for (i, line) in text.lines().enumerate() {
+pub fn indexed(bytes: &[u8]) -> Result<MeshFile, GeomError> {
+    let text = text(bytes);
+    let (mut out, mut cutter) = (MeshFile::default(), Cutter::default());
+    let (mut names, mut name) = (IndexSet::<Arc<str>>::new(), Arc::from(""));
+    let (mut part, mut corners) = (None, Vec::with_capacity(4));
+    let mut free_form = None;
+    for (number, line) in statements(&text) {
         let at =
-            |what: String| GeomError::invalid(format!("line {} of the OBJ file: {what}", i + 1));
-        let mut words = line.split_whitespace();
+            |what: String| GeomError::invalid(format!("line {number} of the OBJ file: {what}"));
+        let mut words = line.split_whitespace().take_while(|w| !w.starts_with('#'));
         match words.next() {
-            Some("v") => {
-                let p = vertex(words).map_err(at)?;
-                vertices += 1;
-                let _ = writeln!(out, "v {} {} {}", p[0], p[1], p[2]);
-            }
-            Some("f") => {
-                let corners = face(words, vertices).map_err(at)?;
-                triangles += corners.len() - 2;
-                if triangles > MOST_TRIANGLES {
+            Some("v") => out.positions.push(vertex(words).map_err(at)?),
+            // The first version of the format wrote `fo` for `f`.
+            Some("f" | "fo") => {
+                face(words, out.positions.len() as i64, &mut corners).map_err(at)?;
+                cutter.cut(&out.positions, &corners, &mut out.triangles);
+                if out.triangles.len() > MOST_TRIANGLES {
                     return Err(at(format!("more than {MOST_TRIANGLES} triangles")));
                 }
-                let next = names.len();
-                let part = *names.entry(name).or_insert(next);
+                let part = *part.get_or_insert_with(|| names.insert_full(Arc::clone(&name)).0);
                 if part >= MOST_PARTS {
                     return Err(at(format!("more than {MOST_PARTS} objects and groups")));
                 }
-                if open != Some(part) {
-                    let _ = writeln!(out, "g {part}");
-                    open = Some(part);
-                }
-                out.push('f');
-                for c in &corners {
-                    let _ = write!(out, " {c}");
-                }
-                out.push('\n');
+                out.parts.resize(out.triangles.len(), part as u16);
             }
             Some(word @ ("o" | "g")) => {
-                name = line.trim_start().strip_prefix(word).unwrap_or_default().trim()
+                name = Arc::from(line.trim_start()[word.len()..].trim());
+                part = None;
             }
-            _ => {}
+            Some(word) => free_form = free_form.or(FREE_FORM.iter().find(|w| **w == word)),
+            None => {}
         }
     }
-    // Sort by number: the hash table's order is arbitrary.
-    let mut by_number = vec![Arc::from(""); names.len()];
-    for (name, number) in names {
-        by_number[number] = Arc::from(name);
+    out.part_names = names.into_iter().collect();
+    if let Some(word) = free_form {
+        out.remarks.push(format!("free-form curves and surfaces (`{word}`) are not read"));
     }
-    Ok((out, by_number))
+    match (out.triangles.is_empty(), free_form, out.positions.len()) {
+        (false, ..) => Ok(out),
+        (_, Some(word), _) => Err(GeomError::invalid(format!(
+            "the OBJ file has no faces; its free-form surfaces (`{word}`) are not read: convert \
+             them to polygons in the program that made them"
+        ))),
+        (_, _, 0) => Err(GeomError::invalid("the OBJ file has no faces")),
+        (_, _, n) => {
+            Err(GeomError::invalid(format!("the OBJ file has {n} vertices, but no faces")))
+        }
+    }
+}
+
+/// Returns the text of a file: UTF-8, with or without a mark of byte order, or else Latin-1,
+/// in which every byte is a character (names and comments may hold some).
+fn text(bytes: &[u8]) -> Cow<'_, str> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    match std::str::from_utf8(bytes) {
+        Ok(text) => Cow::Borrowed(text),
+        Err(_) => Cow::Owned(bytes.iter().map(|b| char::from(*b)).collect()),
+    }
+}
+
+/// The statements of a file with the numbers of their first lines: a line that ends with a
+/// backslash goes on in the next, unless it is a comment or ends with a name (a path, perhaps).
+fn statements(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
+    let mut lines = text.lines().enumerate();
+    std::iter::from_fn(move || {
+        let (i, line) = lines.next()?;
+        let word = line.split_whitespace().next().unwrap_or_default();
+        let goes_on = |line: &str| line.trim_end().ends_with('\\');
+        if !goes_on(line)
+            || word.starts_with('#')
+            || matches!(word, "o" | "g" | "usemtl" | "mtllib")
+        {
+            return Some((i + 1, Cow::Borrowed(line)));
+        }
+        let (mut whole, mut last) = (String::new(), line);
+        while goes_on(last) {
+            whole.push_str(last.trim_end().trim_end_matches('\\'));
+            whole.push(' ');
+            last = lines.next().map_or("", |(_, line)| line);
+        }
+        whole.push_str(last);
+        Some((i + 1, Cow::Owned(whole)))
+    })
 }
 
 /// Parses the numbers after `v`: three coordinates, four, or three and an RGB colour.
-fn vertex<'a>(words: impl Iterator<Item = &'a str>) -> Result<[f32; 3], String> {
+fn vertex<'a>(words: impl Iterator<Item = &'a str>) -> Result<Vec3, String> {
     let mut x = [0.0f32; 7];
     let mut count = 0;
     for w in words {
@@ -188,31 +140,35 @@ fn vertex<'a>(words: impl Iterator<Item = &'a str>) -> Result<[f32; 3], String> 
     if count < 3 {
         return Err("a vertex needs three coordinates".into());
     }
-    let p = [x[0], x[1], x[2]];
+    let p = Vec3::new(x[0], x[1], x[2]);
     if count != 4 {
         return Ok(p);
     }
-    let p = p.map(|a| a / x[3]);
-    if p.iter().all(|a| a.is_finite()) {
+    let p = p / x[3];
+    if p.is_finite() {
         Ok(p)
     } else {
         Err(format!("the coordinates divided by {} are not finite", x[3]))
     }
 }
 
-/// Parses the corners after `f`, counted from 1.
-fn face<'a>(words: impl Iterator<Item = &'a str>, vertices: i64) -> Result<Vec<i64>, String> {
-    let mut corners = Vec::with_capacity(4);
+/// Parses the corners after `f`, counted from 1 or backwards from -1, of vertices so far.
+fn face<'a>(
+    words: impl Iterator<Item = &'a str>,
+    vertices: i64,
+    corners: &mut Vec<u32>,
+) -> Result<(), String> {
+    corners.clear();
     for w in words {
         let number = w.split('/').next().unwrap_or_default();
         let v = number
             .parse::<i64>()
             .map_err(|_| format!("a corner must be the number of a vertex, got `{w}`"))?;
-        let place = if v < 0 { vertices.saturating_add(v).saturating_add(1) } else { v };
-        if !(1..=vertices).contains(&place) {
+        let place = if v < 0 { vertices.saturating_add(v) } else { v - 1 };
+        if !(0..vertices).contains(&place) {
             return Err(format!("no vertex {v}; {vertices} are defined so far"));
         }
-        corners.push(place);
+        corners.push(place as u32);
         if corners.len() > MOST_CORNERS {
             return Err(format!("a face with more than {MOST_CORNERS} corners"));
         }
@@ -220,7 +176,7 @@ fn face<'a>(words: impl Iterator<Item = &'a str>, vertices: i64) -> Result<Vec<i
     if corners.len() < 3 {
         Err(format!("a face needs three corners, got {}", corners.len()))
     } else {
-        Ok(corners)
+        Ok(())
     }
 }
 
@@ -336,7 +292,8 @@ mod tests {
             fails(&many),
             format!("line {} of the OBJ file: more than 65535 objects and groups", 3 + 2 * 65536)
         );
-        assert!(load(&[0x66, 0xff, 0x20]).unwrap_err().to_string().contains("not text"));
+        assert_eq!(fails("v 0 0 0\n"), "the OBJ file has 1 vertices, but no faces");
+        assert!(fails("vp 0 0\nsurf 0 1 0 1 1\n").contains("free-form surfaces (`vp`)"));
     }
 
     #[test]
@@ -364,6 +321,41 @@ mod tests {
             m.bounds().unwrap().max,
             glam::DVec3::new(2.0, 2.0, 0.0),
             "the fourth number divides"
+        );
+    }
+
+    #[test]
+    fn files_as_programs_write_them() {
+        let area = |bytes: &[u8]| -> f32 {
+            let m = load(bytes).unwrap();
+            let corner = |t: &[u32; 3]| t.map(|v| m.positions[v as usize]);
+            m.topology
+                .triangles
+                .iter()
+                .map(corner)
+                .map(|[a, b, c]| (b - a).cross(c - a).length() / 2.0)
+                .sum()
+        };
+        let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+        let same = |text: &str| assert!((area(text.as_bytes()) - 1.0).abs() < 1e-6, "{text:?}");
+        same(&format!("\u{feff}{square}f 1 2 3 4\n"));
+        same(&format!("{square}f 1 2 3 4 # the front\n"));
+        same(&format!("{square}f 1 2 \\\n  3 \\\n4\nl 1 2\np 1\n"));
+        same(&format!(
+            "# C:\\models\\\n{square}mtllib C:\\a b\\\nusemtl a b\nf 1//1 2//1 3//1 4//1\n"
+        ));
+        same(&format!("{square}f -4 -3 -2 -1\n").replace('\n', "\r\n"));
+        same("v 0 0 0 1\nv 1 0 0 1 # one\nv 1 1 0 0.5 0.5 0.5\nv 0 2 0 2\nfo 1 2 3 4");
+        let latin = [b"# caf\xe9\no t\xeate 1\n", square.as_bytes(), b"f 1 2 3 4\n"].concat();
+        assert_eq!(area(&latin), 1.0);
+        assert_eq!(*indexed(&latin).unwrap().part_names[0], *"t\u{ea}te 1");
+        // An L: a fan has area 3.25 or 3.5, by where it starts.
+        let l = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nf 3 4 5 6 1 2\n";
+        assert!((area(l.as_bytes()) - 3.0).abs() < 1e-6);
+        let curved = format!("{square}f 1 2 3 4\nsurf 0 1 0 1 1 2\n");
+        assert_eq!(
+            indexed(curved.as_bytes()).unwrap().remarks,
+            ["free-form curves and surfaces (`surf`) are not read"]
         );
     }
 

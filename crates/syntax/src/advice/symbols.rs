@@ -107,11 +107,6 @@ impl Rules<'_, '_> {
         if self.first() == Some(&Token::Let) && self.distance() == 2 {
             return hint("`let` has no type annotation: write `let x = e;`");
         }
-        if matches!(self.back(2), Some(Token::LBrace | Token::Comma))
-            && matches!(self.back(1), Some(Token::Str(_)))
-        {
-            return hint("the keys of a record are names, without quotes: `{ x: 1 }`");
-        }
         if self.expects_block()
             && !(same_line && matches!(self.next(), Some(Token::Number(_) | Token::Name(_))))
         {
@@ -177,11 +172,6 @@ impl Rules<'_, '_> {
     }
 
     fn string(&self) -> Option<Advice> {
-        if self.next() == Some(&Token::Colon)
-            && matches!(self.back(1), Some(Token::LBrace | Token::Comma))
-        {
-            return hint("the keys of a record are names, without quotes: `{ x: 1 }`");
-        }
         if self.first() == Some(&Token::Param) && self.expects("=") {
             return say(
                 "a `param` without a default",
@@ -204,6 +194,10 @@ impl Rules<'_, '_> {
             (Some(Token::Number(_)), Some(Token::Dot), _, _) => {
                 let number = self.text(self.context.at.saturating_sub(2));
                 hint(format!("a number cannot end with a decimal point: write `{number}.0`"))
+            }
+            (_, Some(Token::LBrace | Token::Comma), Token::Number(_), Some(Token::Colon)) => {
+                let number = self.text(self.context.at);
+                hint(format!("the keys of a record are names or strings: `{{ \"{number}\": … }}`"))
             }
             (_, Some(Token::Dot), Token::Number(_), _) => {
                 hint("an element is written `x[0]`, a field `x.name`")

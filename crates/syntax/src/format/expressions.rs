@@ -2,7 +2,7 @@
 
 use super::printer::{Printer, Share};
 use crate::ast::*;
-use crate::string::quote;
+use crate::string::{quote, record_key};
 use crate::token::is_name;
 
 /// How tightly an expression binds, as in the grammar. An operand that binds less tightly
@@ -133,7 +133,7 @@ impl Printer<'_> {
             }
             ExprKind::Record(fields) => {
                 self.brackets(("{", " ", "}"), fields, Share::Nothing, |p, (name, value)| {
-                    p.token(&name.node);
+                    p.token(&record_key(&name.node));
                     p.text(": ");
                     p.expr(value);
                 })

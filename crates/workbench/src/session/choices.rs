@@ -13,7 +13,7 @@ use pcadlang_numerics::rng::{Purpose, StreamKey};
 use pcadlang_report::number;
 use pcadlang_syntax::ast::{ItemKind, StmtKind};
 use pcadlang_syntax::diag::SourceMap;
-use pcadlang_syntax::{parse, print_expr};
+use pcadlang_syntax::{parse, print_expr, record_key};
 use serde_json::{Number, json};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -211,10 +211,10 @@ fn write(out: &mut Bounded, v: &Value, number: &dyn Fn(f64) -> String) -> fmt::R
             }
             out.write_char(']')
         }
-        Value::Record(r) => {
+        Value::Record(r) if !r.is_empty() => {
             out.write_str("{ ")?;
             for (i, (k, v)) in r.iter().enumerate() {
-                write!(out, "{}{k}: ", if i > 0 { ", " } else { "" })?;
+                write!(out, "{}{}: ", if i > 0 { ", " } else { "" }, record_key(k))?;
                 write(out, v, number)?;
             }
             out.write_str(" }")

@@ -25,7 +25,7 @@ pub use container::{Read, is_gltf};
 pub use morphs::LoadedMorph;
 
 use super::armature::{Armature, Influence, Morph, Rig};
-use super::{FileFrame, GeomError, Mesh};
+use super::{FileFrame, GeomError, Mesh, face_outward};
 use glam::{DVec3, Vec3};
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -95,6 +95,13 @@ pub fn load(bytes: &[u8], frame: &FileFrame, pose: Pose, read: &Read) -> Result<
 }
 
 impl Loaded {
+    /// Turns over closed bodies that are inside out; see [`face_outward`].
+    #[must_use]
+    pub fn outward(mut self) -> Loaded {
+        self.remarks.extend(face_outward(&self.positions, &mut self.triangles));
+        self
+    }
+
     /// Returns everything as one mesh.
     ///
     /// # Errors
