@@ -19,11 +19,20 @@ use std::sync::Arc;
 
 const PATH: Arg = arg("file", Type::Str, "The path, relative to the program's folder.");
 
-const SHAPE: &[Arg] = &[
-    PATH,
-    word("up", &["y", "x", "z"], "The file's up axis; it is rotated to +y."),
-    num("unit", 1.0, "The length of the file's unit in scene units: 0.01 for centimetres.")
-        .unit("m"),
+const UNIT: Arg =
+    num("unit", 1.0, "The length of the file's unit in scene units: 0.01 for centimetres.").unit("m");
+
+const SHAPE: &[Arg] =
+    &[PATH, word("up", &["y", "x", "z"], "The file's up axis; it is rotated to +y."), UNIT];
+
+/// The frame of a camera's file.
+pub(super) const FRAME_OPTIONS: [Arg; 2] = [
+    word(
+        "up",
+        &["y", "x", "z", "-y"],
+        "The up axis of the file's world; it is rotated to +y. A camera's own frame has \"-y\" up.",
+    ),
+    UNIT,
 ];
 
 const NETWORK: &[Arg] = &[
@@ -113,6 +122,7 @@ pub(super) const TABLE: &[Row] = &[
         || Arc::new(DepthFile),
     ),
     DETECTOR,
+    super::camera_file::ROW,
     kind(
         "armature",
         SHAPE,
@@ -381,7 +391,7 @@ pub fn load_keypoints(file: &str, bytes: &[u8], picture: Option<&str>) -> Result
 ///
 /// # Errors
 /// A value that does not fit: a message for the user.
-fn frame(options: &Options) -> Result<FileFrame, String> {
+pub(super) fn frame(options: &Options) -> Result<FileFrame, String> {
     let (mut up, mut unit) = (UpAxis::default(), 1.0);
     for (name, value) in options.iter() {
         match (name, value) {
@@ -390,6 +400,7 @@ fn frame(options: &Options) -> Result<FileFrame, String> {
                     "x" => UpAxis::X,
                     "y" => UpAxis::Y,
                     "z" => UpAxis::Z,
+                    "-y" => UpAxis::MinusY,
                     other => {
                         return Err(format!("`up` must be \"x\", \"y\" or \"z\", not \"{other}\""));
                     }

@@ -2,17 +2,19 @@
 //! and skins as a rig.
 //!
 //! Supports `.glb` and `.gltf`, with buffers in the file, in other files, or in `data:`
-//! URIs. Materials, the file's own normals, cameras, animations and morph targets are
-//! ignored; sparse accessors and compressed meshes are refused. Invariant: every index is
-//! checked before it is used, so no input can cause a panic.
+//! URIs. Materials, the file's own normals, animations and morph targets are ignored; sparse
+//! accessors and compressed meshes are refused. Cameras are read apart, by [`cameras`].
+//! Invariant: every index is checked before it is used, so no input can cause a panic.
 
 mod access;
+mod cameras;
 mod container;
 mod json;
 mod nodes;
 mod shapes;
 mod skin;
 
+pub use cameras::{GltfCamera, cameras};
 pub use container::{Read, is_gltf};
 
 use super::armature::{Armature, Influence, Rig};

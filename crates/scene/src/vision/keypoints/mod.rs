@@ -29,6 +29,7 @@ mod names;
 mod node;
 mod people;
 mod relative_depth;
+mod undistort;
 
 #[cfg(test)]
 mod calibration_tests;
