@@ -7,6 +7,7 @@ mod shipped;
 
 mod armature;
 mod caches;
+mod cameras;
 mod drawing;
 mod gltf;
 mod keypoints;

@@ -78,17 +78,21 @@ fn say(file: &CameraFile, Seen { camera, lens }: &Seen) {
     line("principal", format!("({x}, {y}) pixels; the first pixel's centre is (0.5, 0.5)"));
     let coefficients = lens.as_ref().map_or_else(Vec::new, |lens| {
         let d = lens.distortion();
-        let all = [("k", &d.radial[..]), ("divisor ", &d.divisor), ("p", &d.tangential), ("s", &d.prism)];
+        let all =
+            [("k", &d.radial[..]), ("divisor ", &d.divisor), ("p", &d.tangential), ("s", &d.prism)];
         let name = |(name, c): (&'static str, &[f64])| {
             let some = c.iter().enumerate().filter(|(_, x)| **x != 0.0);
             some.map(|(i, x)| format!("{name}{} {x}", i + 1)).collect::<Vec<_>>()
         };
         all.map(name).concat()
     });
-    line("distortion", match coefficients.is_empty() {
-        true => "none".to_owned(),
-        false => coefficients.join(", "),
-    });
+    line(
+        "distortion",
+        match coefficients.is_empty() {
+            true => "none".to_owned(),
+            false => coefficients.join(", "),
+        },
+    );
     if let Projection::Pinhole { focal_px, .. } = camera.projection {
         let angle = |side: u32| 2.0 * (f64::from(side) / 2.0 / focal_px).atan().to_degrees();
         let (w, h) = (angle(camera.width), angle(camera.height));
@@ -99,10 +103,13 @@ fn say(file: &CameraFile, Seen { camera, lens }: &Seen) {
     line("looks along", triple(camera.forward));
     line("up", triple(camera.up));
     let (x, y, depth) = camera.project(DVec3::ZERO);
-    line("origin", match depth > Camera::NEAR {
-        true => format!("at ({x:.1}, {y:.1}) pixels, depth {}", short(depth)),
-        false => "behind the camera".to_owned(),
-    });
+    line(
+        "origin",
+        match depth > Camera::NEAR {
+            true => format!("at ({x:.1}, {y:.1}) pixels, depth {}", short(depth)),
+            false => "behind the camera".to_owned(),
+        },
+    );
     if let (Some(_), Projection::Pinhole { focal_px, .. }) = (lens, camera.projection) {
         let (w, h) = (camera.width, camera.height);
         line("undistorted", format!("{w} x {h} pixels, focal {} pixels", short(focal_px)));
@@ -114,7 +121,8 @@ fn say(file: &CameraFile, Seen { camera, lens }: &Seen) {
 fn short(x: f64) -> String {
     let digits = (5.0 - x.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
     let text = format!("{x:.digits$}");
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &*text };
+    let text =
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &*text };
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
@@ -152,14 +160,22 @@ fn axes(seen: &Seen, photo: Option<&Photo>, at: DVec3) -> Result<RgbImage, Failu
     };
     let long = 0.2 * unit * f64::from(camera.width.max(camera.height));
     let ten = 10f64.powf(long.log10().floor());
-    let long = ten * if long >= 5.0 * ten { 5.0 } else if long >= 2.0 * ten { 2.0 } else { 1.0 };
+    let long = ten
+        * if long >= 5.0 * ten {
+            5.0
+        } else if long >= 2.0 * ten {
+            2.0
+        } else {
+            1.0
+        };
     let mut draw = |lines: &[[DVec3; 2]], color: [f32; 3]| {
         // In pieces, so that what is behind the camera can be left out.
         const PIECES: i32 = 32;
         let pieces = lines.iter().flat_map(|[a, b]| {
             (0..PIECES).filter_map(|i| {
                 let end = |i: i32| {
-                    let (x, y, depth) = camera.project(a.lerp(*b, f64::from(i) / f64::from(PIECES)));
+                    let (x, y, depth) =
+                        camera.project(a.lerp(*b, f64::from(i) / f64::from(PIECES)));
                     (depth > Camera::NEAR && x.abs() < 1e5 && y.abs() < 1e5).then_some([x, y])
                 };
                 Some([end(i)?, end(i + 1)?])
@@ -172,9 +188,7 @@ fn axes(seen: &Seen, photo: Option<&Photo>, at: DVec3) -> Result<RgbImage, Failu
     let grid: Vec<_> = (-5..=5)
         .flat_map(|i| {
             let s = f64::from(i) * long;
-            let line = |a: [f64; 2], b: [f64; 2]| {
-                [a, b].map(|[x, z]| at + DVec3::new(x, 0.0, z))
-            };
+            let line = |a: [f64; 2], b: [f64; 2]| [a, b].map(|[x, z]| at + DVec3::new(x, 0.0, z));
             [line([s, -half], [s, half]), line([-half, s], [half, s])]
         })
         .collect();

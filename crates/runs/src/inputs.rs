@@ -12,6 +12,7 @@ use pcadlang_library::scene::camera_file::{NamedCamera, kind_options};
 use pcadlang_library::scene::{self, DetectorValue, ImageValue};
 use pcadlang_library::{Model, Program, standard};
 use pcadlang_scene::cameras::CameraFile;
+use pcadlang_scene::render::Camera;
 use pcadlang_scene::vision::{self, ContourMap, Photo};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -53,17 +54,27 @@ impl Ready {
 pub fn prepare(job: &Job, quiet: bool) -> Result<Ready, Failure> {
     let begun = Instant::now();
     let program = program_of(job, quiet)?;
+    let photo = picture_of(&program, job);
+    let ready = prepare_program(program, job, begun)?;
     if !quiet {
-        camera_notes(&program, job)?;
+        camera_notes(&ready, photo.as_deref(), job)?;
     }
-    prepare_program(program, job, begun)
+    Ok(ready)
 }
 
 /// Says what a user should know of the run's camera.
-fn camera_notes(program: &Program, job: &Job) -> Result<(), Failure> {
-    let photo = picture_of(program, job);
+fn camera_notes(ready: &Ready, photo: Option<&str>, job: &Job) -> Result<(), Failure> {
+    let stated = ready.photo().and_then(|p| Some((p, p.focal()?)));
+    if let (None, Some((photo, focal))) = (&job.inputs.camera, stated) {
+        let Camera { eye, .. } = Camera::default_by(photo.width(), photo.height(), focal);
+        error_line!(
+            "note: by its Exif data the photograph has a lens of {focal:.2} times its longer side; the \
+             default view is from distance {:.2}, not 8",
+            eye.z
+        );
+    }
     if let Some(spec) = &job.inputs.camera {
-        let file = camera(spec, None, photo.as_deref())?;
+        let file = camera(spec, None, photo)?;
         for remark in &file.remarks {
             error_line!("note: {}: {remark}", spec.display());
         }
@@ -115,11 +126,7 @@ pub fn program(inputs: &Inputs, quiet: bool) -> Result<Program, Failure> {
     with_camera(without_camera(inputs, quiet)?, inputs, None)
 }
 
-fn with_camera(
-    program: Program,
-    inputs: &Inputs,
-    photo: Option<&str>,
-) -> Result<Program, Failure> {
+fn with_camera(program: Program, inputs: &Inputs, photo: Option<&str>) -> Result<Program, Failure> {
     match &inputs.camera {
         Some(spec) => Ok(program.camera_file(camera(spec, None, photo)?)),
         None => Ok(program),

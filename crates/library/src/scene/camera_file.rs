@@ -61,7 +61,8 @@ impl Object for CameraFileValue {
         let mut all = self.0.remarks.clone();
         if self.0.seen(None).is_ok_and(|s| s.lens.is_some()) {
             all.push(
-                "its lens distorts, and photographs are not undistorted by it: use --camera".to_owned(),
+                "its lens distorts, and photographs are not undistorted by it: use --camera"
+                    .to_owned(),
             );
         }
         (!all.is_empty()).then(|| all.join("; "))
@@ -136,7 +137,8 @@ impl NamedCamera {
     /// # Errors
     /// If an option is not one of the kind `camera`.
     pub fn parse(spec: &Path) -> Result<NamedCamera, Fault> {
-        let whole = || NamedCamera { file: spec.into(), picture: None, options: Options::default() };
+        let whole =
+            || NamedCamera { file: spec.into(), picture: None, options: Options::default() };
         let (Some(text), false) = (spec.to_str(), spec.is_file()) else { return Ok(whole()) };
         let (path, options) = match text.split_once(',') {
             Some((path, options)) => (path.trim(), kind_options("camera", options)?),
@@ -174,8 +176,7 @@ impl NamedCamera {
                 .map_err(|e| format!("cannot read {other}: {e}"))
         };
         let asked = asked(self.picture.as_deref(), photo, &self.options)?;
-        CameraFile::read(&name, &bytes, &asked, &beside)
-            .map_err(|e| fault(format!("{name}: {e}")))
+        CameraFile::read(&name, &bytes, &asked, &beside).map_err(|e| fault(format!("{name}: {e}")))
     }
 
     /// The bytes that it depends on: its files, and how they are read.
@@ -227,7 +228,8 @@ mod tests {
     #[test]
     fn a_file_a_picture_and_options() {
         let of = |spec: &str| NamedCamera::parse(Path::new(spec));
-        let named = of("no/such/cameras.txt#a b.jpg, up = \"z\", unit = 0.001, at = \"view\"").unwrap();
+        let named =
+            of("no/such/cameras.txt#a b.jpg, up = \"z\", unit = 0.001, at = \"view\"").unwrap();
         assert_eq!(named.file, Path::new("no/such/cameras.txt"));
         assert_eq!(named.picture.as_deref(), Some("a b.jpg"));
         assert_eq!(named.options.iter().count(), 3);

@@ -20,7 +20,8 @@ use std::sync::Arc;
 const PATH: Arg = arg("file", Type::Str, "The path, relative to the program's folder.");
 
 const UNIT: Arg =
-    num("unit", 1.0, "The length of the file's unit in scene units: 0.01 for centimetres.").unit("m");
+    num("unit", 1.0, "The length of the file's unit in scene units: 0.01 for centimetres.")
+        .unit("m");
 
 const SHAPE: &[Arg] =
     &[PATH, word("up", &["y", "x", "z"], "The file's up axis; it is rotated to +y."), UNIT];

@@ -116,6 +116,9 @@ impl ImageValue {
     /// (docs/measurements/objects.md).
     pub(super) const STRONG: f32 = 0.4;
 
+    /// The focal length of the default view in longer sides of the picture, as programs write it.
+    const USUAL_FOCAL: f64 = 1.818;
+
     /// The longer side of pictures to look at in pixels: more show no more of a scene that is
     /// compared at a few hundred.
     pub const SHOWN: u32 = 1600;
@@ -373,6 +376,8 @@ impl Object for ImageValue {
         match name {
             "width" => Some(Value::Num(f64::from(self.size().0))),
             "height" => Some(Value::Num(f64::from(self.size().1))),
+            "focal" => Some(Value::Num(self.focal().unwrap_or(ImageValue::USUAL_FOCAL))),
+            "focal_sd" => Some(Value::Num(if self.focal().is_some() { 0.05 } else { 0.4 })),
             _ => None,
         }
     }

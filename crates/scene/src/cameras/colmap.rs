@@ -142,7 +142,10 @@ pub(super) fn read(
     };
     let (name, taken) = selected(&taken, asked, "picture")?;
     let camera = lenses.iter().find(|c| c.id == taken.camera).ok_or_else(|| {
-        CameraError::other(format!("picture `{name}` is of camera {}, which is missing", taken.camera))
+        CameraError::other(format!(
+            "picture `{name}` is of camera {}, which is missing",
+            taken.camera
+        ))
     })?;
     let mut file = lens(format, camera)?;
     file.picture = Some(name.clone());

@@ -37,9 +37,8 @@ fn yaml(text: &str) -> Result<Value, CameraError> {
     // Of each open list or mapping, what it has so far, and the key that waits for its value.
     let mut open: Vec<(Value, Option<String>)> = Vec::new();
     for event in Parser::new_from_str(text) {
-        let (event, span) = event.map_err(|e| {
-            wrong(e.marker().line(), e.marker().col() + 1, e.info())
-        })?;
+        let (event, span) =
+            event.map_err(|e| wrong(e.marker().line(), e.marker().col() + 1, e.info()))?;
         let fail = |why: &str| wrong(span.start.line(), span.start.col() + 1, why);
         let mut value = match event {
             Event::Scalar(text, style, ..) => scalar(&text, style),
@@ -53,7 +52,9 @@ fn yaml(text: &str) -> Result<Value, CameraError> {
                 continue;
             }
             Event::SequenceEnd | Event::MappingEnd => {
-                let Some((done, _)) = open.pop() else { return Err(fail("an end without a start")) };
+                let Some((done, _)) = open.pop() else {
+                    return Err(fail("an end without a start"));
+                };
                 done
             }
             Event::Alias(_) => return Err(fail("references (*name) are not read")),
@@ -120,9 +121,7 @@ pub(super) fn array<const N: usize>(value: &Value) -> Option<[f64; N]> {
 
 /// Width and height, whole pixels.
 pub(super) fn size(width: f64, height: f64) -> Option<(u32, u32)> {
-    let side = |x: f64| {
-        ((1.0..=16384.0).contains(&x) && x.fract() == 0.0).then_some(x as u32)
-    };
+    let side = |x: f64| ((1.0..=16384.0).contains(&x) && x.fract() == 0.0).then_some(x as u32);
     side(width).zip(side(height))
 }
 
@@ -133,5 +132,7 @@ pub(super) fn bare(key: &str) -> String {
 
 /// The value of the first of these keys (as [`bare`] writes them) that is there and not null.
 pub(super) fn get<'a>(map: &'a Map<String, Value>, keys: &[&str]) -> Option<&'a Value> {
-    keys.iter().find_map(|k| map.iter().find(|(key, v)| bare(key) == *k && !v.is_null())).map(|(_, v)| v)
+    keys.iter()
+        .find_map(|k| map.iter().find(|(key, v)| bare(key) == *k && !v.is_null()))
+        .map(|(_, v)| v)
 }

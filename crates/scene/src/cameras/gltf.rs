@@ -22,11 +22,8 @@ pub(super) fn read(bytes: &[u8], asked: &Asked) -> Result<CameraFile, CameraErro
         )));
     };
     let half = libm::tan(yfov / 2.0);
-    let mut file = CameraFile::new(
-        "glTF",
-        "perspective",
-        Intrinsics::Angle { half, across: false, aspect },
-    );
+    let mut file =
+        CameraFile::new("glTF", "perspective", Intrinsics::Angle { half, across: false, aspect });
     file.picture = Some(name.clone());
     file.pose = Some(Pose::to_world(DMat4::from(camera.to_world))?);
     if several > 1 && asked.picture.is_none() {

@@ -216,7 +216,10 @@ impl Camera {
     }
 }
 
-fn placed(Pinhole { size: (width, height), focal_px, centre: [cx, cy] }: Pinhole, p: Pose) -> Camera {
+fn placed(
+    Pinhole { size: (width, height), focal_px, centre: [cx, cy] }: Pinhole,
+    p: Pose,
+) -> Camera {
     let Pose { eye, right, up, forward } = p;
     let projection = Projection::Pinhole { focal_px, cx, cy };
     Camera { eye, right, up, forward, width, height, projection }

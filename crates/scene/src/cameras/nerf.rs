@@ -39,15 +39,15 @@ pub(super) fn read(
     let at = |key: &str| get(key).and_then(number);
     let model = get("camera_model").and_then(Value::as_str).unwrap_or("pinhole").to_owned();
     let fisheye = get("is_fisheye").and_then(Value::as_bool).unwrap_or(false);
-    if fisheye || ["FISHEYE", "EQUIRECT", "OMNI", "FOV"].iter().any(|f| model.to_uppercase().contains(f)) {
+    if fisheye
+        || ["FISHEYE", "EQUIRECT", "OMNI", "FOV"].iter().any(|f| model.to_uppercase().contains(f))
+    {
         return Err(CameraError::other(format!(
             "the lens is a fisheye ({model}), which is not supported: {UNDISTORT}"
         )));
     }
     let side = at("w").zip(at("h")).and_then(|(w, h)| size(w, h));
-    let half = |key: &str| {
-        at(key).filter(|a| *a > 0.0 && *a < 3.1).map(|a| libm::tan(a / 2.0))
-    };
+    let half = |key: &str| at(key).filter(|a| *a > 0.0 && *a < 3.1).map(|a| libm::tan(a / 2.0));
     let angles = (half("camera_angle_x"), half("camera_angle_y"));
     let term = |key: &str| at(key).unwrap_or(0.0);
     let distortion = Distortion {
@@ -78,7 +78,8 @@ pub(super) fn read(
     let mut file = CameraFile::new("transforms.json (NeRF)", model, intrinsics);
     if let Some((name, frame)) = chosen {
         file.picture = Some(name.clone());
-        let matrix = frame.get("transform_matrix").ok_or(CameraError::Missing("transform_matrix"))?;
+        let matrix =
+            frame.get("transform_matrix").ok_or(CameraError::Missing("transform_matrix"))?;
         let m: [f64; 16] = array(matrix).ok_or(CameraError::Invalid {
             key: "transform_matrix",
             wanted: "4 x 4 numbers, row by row",

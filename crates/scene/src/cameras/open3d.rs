@@ -32,8 +32,8 @@ fn parameters(map: &Map<String, Value>) -> Result<Option<CameraFile>, CameraErro
         return Ok(None);
     };
     let wrong = |key: &'static str, wanted| CameraError::Invalid { key, wanted };
-    let columns: [f64; 9] = array(matrix)
-        .ok_or_else(|| wrong("intrinsic_matrix", "9 numbers, column by column"))?;
+    let columns: [f64; 9] =
+        array(matrix).ok_or_else(|| wrong("intrinsic_matrix", "9 numbers, column by column"))?;
     let (focal, centre) =
         of_matrix(DMat3::from_cols_array(&columns).transpose().to_cols_array())
             .map_err(|_| wrong("intrinsic_matrix", "[fx 0 0 0 fy 0 cx cy 1], column by column"))?;

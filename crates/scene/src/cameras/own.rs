@@ -224,7 +224,11 @@ mod tests {
         let message = |text: &str| Camera::from_json(text).unwrap_err().to_string();
         for key in ["model", "position", "looks_along", "up", "image", "focal_px"] {
             assert_eq!(
-                message(&GOOD.replace("\"note\"", "\"name\"").replace(&format!("\"{key}\""), "\"note\"")),
+                message(
+                    &GOOD
+                        .replace("\"note\"", "\"name\"")
+                        .replace(&format!("\"{key}\""), "\"note\"")
+                ),
                 format!("the camera file has no `{key}`")
             );
         }

@@ -70,7 +70,9 @@ fn orthonormal(m: DMat3) -> Result<DMat3, CameraError> {
     let m = m * (1.0 / det.cbrt());
     let off = m.transpose() * m - DMat3::IDENTITY;
     if !(off.to_cols_array().iter().all(|x| x.abs() < 0.02)) {
-        return wrong("is not a rotation: its rows are not at right angles, or of different lengths");
+        return wrong(
+            "is not a rotation: its rows are not at right angles, or of different lengths",
+        );
     }
     Ok(DMat3::from_quat(DQuat::from_mat3(&m).normalize()))
 }

@@ -129,10 +129,16 @@ fn ros_without_a_position_stands_at_the_default_view() {
     assert_eq!((camera.width, camera.height), (640, 480));
     assert_eq!(camera.forward, DVec3::NEG_Z);
     // 640 pixels show 4.4 units at z = 0.
-    let (left, right) = (camera.unproject(0.0, 0.0, camera.eye.z), camera.unproject(640.0, 0.0, camera.eye.z));
+    let (left, right) =
+        (camera.unproject(0.0, 0.0, camera.eye.z), camera.unproject(640.0, 0.0, camera.eye.z));
     assert!((right.x - left.x - 4.4).abs() < 1e-9 && right.z.abs() < 1e-9);
     assert!(lens.is_some());
-    let file = read_at("c.yaml", text.as_bytes(), &Asked { at: Some(Standpoint::File), ..Asked::default() }).unwrap();
+    let file = read_at(
+        "c.yaml",
+        text.as_bytes(),
+        &Asked { at: Some(Standpoint::File), ..Asked::default() },
+    )
+    .unwrap();
     let camera = file.seen(None).unwrap().camera;
     assert_eq!((camera.eye, camera.up, camera.forward), (DVec3::ZERO, DVec3::NEG_Y, DVec3::Z));
     // With -y up, the same camera looks along -z.
@@ -141,7 +147,10 @@ fn ros_without_a_position_stands_at_the_default_view() {
     let camera = file.seen(None).unwrap().camera;
     assert_eq!((camera.eye, camera.up, camera.forward), (DVec3::ZERO, DVec3::Y, DVec3::NEG_Z));
     for fisheye in ["equidistant", "fisheye"] {
-        assert!(refusal(&text.replace("plumb_bob", fisheye)).contains("undistort photograph and camera first"));
+        assert!(
+            refusal(&text.replace("plumb_bob", fisheye))
+                .contains("undistort photograph and camera first")
+        );
     }
 }
 
@@ -204,7 +213,8 @@ fn colmap_as_text() {
         "images.txt" => Ok(images.clone().into_bytes()),
         _ => Err("missing".to_owned()),
     };
-    let of = |asked: &Asked| CameraFile::read("m/cameras.txt", CAMERAS_TXT.as_bytes(), asked, &beside);
+    let of =
+        |asked: &Asked| CameraFile::read("m/cameras.txt", CAMERAS_TXT.as_bytes(), asked, &beside);
     let simple = [[286.1483, 312.5796], [232.0264, 189.3537], [312.0895, 271.4339]];
     let full = [[286.5661, 315.1783], [230.4906, 187.6736], [313.5153, 272.6086]];
     sees(&of(&named("left/photo 3.jpg")).unwrap(), &simple, 0.0);
@@ -218,12 +228,19 @@ fn colmap_as_text() {
     assert!(said.contains("OPENCV_FISHEYE") && said.contains("colmap image_undistorter"), "{said}");
     let said = of(&Asked::default()).unwrap_err().to_string();
     assert!(said.contains("FILE#NAME, one of left/photo 3.jpg"), "{said}");
-    assert!(of(&named("photo 8.jpg")).unwrap_err().to_string().contains("no picture `photo 8.jpg`"));
+    assert!(
+        of(&named("photo 8.jpg")).unwrap_err().to_string().contains("no picture `photo 8.jpg`")
+    );
     // The lenses alone, by number; and a file by its content.
     let alone = read_at("lens", CAMERAS_TXT.as_bytes(), &named("5")).unwrap();
     assert!(!alone.has_position() && alone.remarks[0].contains("images.txt"));
     let line = CAMERAS_TXT.replace(" 240 -0.2000", " -0.2000");
-    assert!(read_at("cameras.txt", line.as_bytes(), &named("3")).unwrap_err().to_string().contains("has 4"));
+    assert!(
+        read_at("cameras.txt", line.as_bytes(), &named("3"))
+            .unwrap_err()
+            .to_string()
+            .contains("has 4")
+    );
     let bad = CAMERAS_TXT.replace("5 OPENCV 640", "5 OPENCV wide");
     let said = read_at("cameras.txt", bad.as_bytes(), &named("3")).unwrap_err().to_string();
     assert!(said.contains("cameras.txt: line 4"), "{said}");
@@ -255,7 +272,8 @@ fn transforms_of_nerfs() {
         {"file_path": "./images/frame_00001.png", "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 9], [0, 0, 0, 1]]},
         {"file_path": "./images/frame_00002.png",
          "transform_matrix": [[0.8, -0.36, 0.48, 2.0], [0.6, 0.48, -0.64, -2.5], [0, 0.8, 0.6, 2.2], [0, 0, 0, 1]]}]}"#;
-    let of = |text: &str, asked: &Asked| read_at("transforms.json", text.as_bytes(), asked).unwrap();
+    let of =
+        |text: &str, asked: &Asked| read_at("transforms.json", text.as_bytes(), asked).unwrap();
     let photo = Asked { photo: Some("data/images/frame_00002.png"), ..Asked::default() };
     let file = of(text, &photo);
     let p = DVec3::splat(0.5);
@@ -265,7 +283,10 @@ fn transforms_of_nerfs() {
     near(shown(&file, None, p), [407.07786885245895, 152.12431693989078]);
     // Blender's: an angle across, names without endings, a size by the photograph.
     let blender = text
-        .replace(r#""fl_x": 520.5, "fl_y": 518.75, "cx": 321.75, "cy": 240, "w": 640, "h": 480,"#, r#""camera_angle_x": 0.9,"#)
+        .replace(
+            r#""fl_x": 520.5, "fl_y": 518.75, "cx": 321.75, "cy": 240, "w": 640, "h": 480,"#,
+            r#""camera_angle_x": 0.9,"#,
+        )
         .replace("frame_00002.png", "frame_00002");
     let file = of(&blender, &photo);
     near(shown(&file, Some((640, 480)), p), [428.59841895350615, 127.78163374804362]);
@@ -281,8 +302,14 @@ fn transforms_of_nerfs() {
 }
 
 const ROTATION: [f64; 9] = [
-    0.9076733711903686, 0.18012426052921143, -0.3790571223453214, -0.33036608954935215,
-    -0.2503524002059387, -0.9100450112972408, -0.25881904510252074, 0.9512512425641978,
+    0.9076733711903686,
+    0.18012426052921143,
+    -0.3790571223453214,
+    -0.33036608954935215,
+    -0.2503524002059387,
+    -0.9100450112972408,
+    -0.25881904510252074,
+    0.9512512425641978,
     -0.1677312594965203,
 ];
 
@@ -308,10 +335,14 @@ fn bop_by_the_number_of_the_picture() {
 #[test]
 fn open3d_column_by_column() {
     let columns = |m: &[f64], n: usize| {
-        (0..n).flat_map(|c| (0..n).map(move |r| m[r * n + c].to_string())).collect::<Vec<_>>().join(", ")
+        (0..n)
+            .flat_map(|c| (0..n).map(move |r| m[r * n + c].to_string()))
+            .collect::<Vec<_>>()
+            .join(", ")
     };
     let r = ROTATION;
-    let e = [r[0], r[1], r[2], 0.1, r[3], r[4], r[5], -0.2, r[6], r[7], r[8], 4.0, 0.0, 0.0, 0.0, 1.0];
+    let e =
+        [r[0], r[1], r[2], 0.1, r[3], r[4], r[5], -0.2, r[6], r[7], r[8], 4.0, 0.0, 0.0, 0.0, 1.0];
     let intrinsic = r#"{"height": 480, "intrinsic_matrix": [520.5, 0.0, 0.0, 0.0, 518.75, 0.0, 321.25, 239.5, 1.0], "width": 640}"#;
     let one = format!(
         r#"{{"class_name": "PinholeCameraParameters", "extrinsic": [{}], "intrinsic": {intrinsic},
@@ -321,7 +352,8 @@ fn open3d_column_by_column() {
     sees(&read(&one), &UNDISTORTED, 0.5);
     let lens = read(intrinsic);
     assert_eq!((lens.format, lens.has_position()), ("Open3D", false));
-    let path = format!(r#"{{"class_name": "PinholeCameraTrajectory", "parameters": [{one}, {one}]}}"#);
+    let path =
+        format!(r#"{{"class_name": "PinholeCameraTrajectory", "parameters": [{one}, {one}]}}"#);
     sees(&read_at("t.json", path.as_bytes(), &named("1")).unwrap(), &UNDISTORTED, 0.5);
     assert!(refusal(&path).contains("FILE#NAME"));
     let rows = one.replace(&columns(&e, 4), &e.map(|x| x.to_string()).join(", "));
@@ -335,7 +367,11 @@ fn realsense_and_kinect() {
         "model": "distortion.inverse_brown_conrady", "coeffs": [-0.28, 0.09, 0.0012, -0.0007, -0.015]}"#;
     let own = |text: &str| {
         let asked = Asked { at: Some(Standpoint::File), ..Asked::default() };
-        shown(&read_at("i.json", text.as_bytes(), &asked).unwrap(), None, DVec3::new(0.3, -0.2, 1.0))
+        shown(
+            &read_at("i.json", text.as_bytes(), &asked).unwrap(),
+            None,
+            DVec3::new(0.3, -0.2, 1.0),
+        )
     };
     for (model, [x, y]) in [
         ("inverse_brown_conrady", [495.0103759765625, 122.24823760986328]),
@@ -404,12 +440,19 @@ fn what_is_no_camera() {
         ("camera_matrix: [1, 2]\n", "3 x 3"),
         ("camera_matrix: [500, 3, 320, 0, 500, 240, 0, 0, 1]\n", "skew"),
         ("camera_matrix: [500, 0, 0, 0, 500, 0, 320, 240, 1]\n", "row by row"),
-        ("{\"fx\": 500, \"fy\": 500, \"cx\": 1, \"cy\": 1, \"coeffs\": [1, 2, 3]}", "3 coefficients"),
+        (
+            "{\"fx\": 500, \"fy\": 500, \"cx\": 1, \"cy\": 1, \"coeffs\": [1, 2, 3]}",
+            "3 coefficients",
+        ),
     ] {
         assert!(refusal(text).contains(why), "{text}: {}", refusal(text));
     }
     let deep = format!("a: {}", "[".repeat(5000));
-    assert!(refusal(&deep).contains("too deep") || refusal(&deep).contains("line 1"), "{}", refusal(&deep));
+    assert!(
+        refusal(&deep).contains("too deep") || refusal(&deep).contains("line 1"),
+        "{}",
+        refusal(&deep)
+    );
     assert!(refusal(&"a:\n - b:\n".repeat(1)).contains("known are"));
     assert!(read_at("x", &[0xff, 0xfe, 0, 1], &Asked::default()).is_err());
     let own = r#"{"model": "pinhole", "position": [0, 0, 8], "looks_along": [0, 0, -1], "up": [0, 1, 0],

@@ -40,7 +40,8 @@ impl Distortion {
     fn factor(&self, r2: f64) -> f64 {
         let [k1, k2, k3, k4] = self.radial;
         let [d1, d2, d3] = self.divisor;
-        (1.0 + r2 * (k1 + r2 * (k2 + r2 * (k3 + r2 * k4)))) / (1.0 + r2 * (d1 + r2 * (d2 + r2 * d3)))
+        (1.0 + r2 * (k1 + r2 * (k2 + r2 * (k3 + r2 * k4))))
+            / (1.0 + r2 * (d1 + r2 * (d2 + r2 * d3)))
     }
 
     fn apply(&self, [x, y]: [f64; 2]) -> [f64; 2] {
@@ -137,8 +138,14 @@ impl Lens {
             }
         };
         let limit = distortion.limit();
-        (sound(size) && sound(pinhole.size))
-            .then_some(Lens { size, focal, centre, distortion, limit, pinhole })
+        (sound(size) && sound(pinhole.size)).then_some(Lens {
+            size,
+            focal,
+            centre,
+            distortion,
+            limit,
+            pinhole,
+        })
     }
 
     /// The pinhole that an undistorted photograph is seen by.
@@ -230,10 +237,8 @@ impl Lens {
 
     /// The same lens for a photograph at another resolution.
     pub fn scaled(&self, (width, height): (u32, u32)) -> Option<Lens> {
-        let by = [
-            f64::from(width) / f64::from(self.size.0),
-            f64::from(height) / f64::from(self.size.1),
-        ];
+        let by =
+            [f64::from(width) / f64::from(self.size.0), f64::from(height) / f64::from(self.size.1)];
         let scaled = |of: [f64; 2]| [of[0] * by[0], of[1] * by[1]];
         let size = (width, height);
         Lens::new(size, scaled(self.focal), scaled(self.centre), self.distortion)

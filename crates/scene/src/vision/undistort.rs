@@ -110,7 +110,10 @@ impl ContourMap {
             };
             let along = [b[0] - a[0], b[1] - a[1]];
             let length = libm::hypot(along[0], along[1]);
-            if length > 0.0 && (0.0..=f64::from(width)).contains(&x) && (0.0..=f64::from(height)).contains(&y) {
+            if length > 0.0
+                && (0.0..=f64::from(width)).contains(&x)
+                && (0.0..=f64::from(height)).contains(&y)
+            {
                 map.x.push(x as f32);
                 map.y.push(y as f32);
                 map.tx.push((along[0] / length) as f32);
@@ -139,14 +142,14 @@ impl Hint {
             let middle = [0, 1].map(|i| 0.5 * (a.foot[i] + a.top[i]));
             let along = [0, 1].map(|i| a.top[i] - a.foot[i]);
             let half = 0.5 * a.width / libm::hypot(along[0], along[1]);
-            let side = |s: f64| one(&[middle[0] - s * half * along[1], middle[1] + s * half * along[0]]);
+            let side =
+                |s: f64| one(&[middle[0] - s * half * along[1], middle[1] + s * half * along[0]]);
             let (l, r) = (side(-1.0)?, side(1.0)?);
             Ok(AxisHint { foot, top, width: libm::hypot(r[0] - l[0], r[1] - l[1]) })
         };
         let bounds = |[x, y, w, h]: &[f64; 4]| -> Result<[f64; 4], VisionError> {
-            let corners = [0.0, 0.5, 1.0]
-                .map(|u| [0.0, 0.5, 1.0].map(|v| [x + u * w, y + v * h]))
-                .concat();
+            let corners =
+                [0.0, 0.5, 1.0].map(|u| [0.0, 0.5, 1.0].map(|v| [x + u * w, y + v * h])).concat();
             let seen = all(&corners)?;
             let end = |i: usize, f: fn(f64, f64) -> f64, from: f64| {
                 seen.iter().map(|p| p[i]).fold(from, f)

@@ -76,7 +76,9 @@ fn masks_and_depths_take_the_nearest_pixel() {
 #[test]
 fn keypoints_contours_and_hints_move_with_the_picture() {
     let lens = lens();
-    let near = |[x, y]: [f64; 2], [u, v]: [f64; 2], most: f64| assert!((x - u).hypot(y - v) < most, "{x} {y} {u} {v}");
+    let near = |[x, y]: [f64; 2], [u, v]: [f64; 2], most: f64| {
+        assert!((x - u).hypot(y - v) < most, "{x} {y} {u} {v}")
+    };
     for ([i, j], [x, y]) in MAP {
         let (at, to) = ([x + 0.5, y + 0.5], [i, j].map(|n| f64::from(n) + 0.5));
         let one = Keypoints::new(vec![Keypoint::new("nose", at, 0.5)]).unwrap().in_image(640, 480);
@@ -91,14 +93,19 @@ fn keypoints_contours_and_hints_move_with_the_picture() {
         let moved = map.undistorted(&lens).unwrap();
         near([f64::from(moved.x[0]), f64::from(moved.y[0])], to, 2e-3);
         assert!((f64::from(moved.tx[0]).hypot(f64::from(moved.ty[0])) - 1.0).abs() < 1e-6);
-        let hint = Hint { at: vec![at], bounds: Some([at[0] - 2.0, at[1] - 2.0, 4.0, 4.0]), ..Hint::default() };
+        let hint = Hint {
+            at: vec![at],
+            bounds: Some([at[0] - 2.0, at[1] - 2.0, 4.0, 4.0]),
+            ..Hint::default()
+        };
         let moved = hint.undistorted(&lens, (640, 480)).unwrap();
         near(moved.at[0], to, 2e-3);
         let [x, y, w, h] = moved.bounds.unwrap();
         assert!(x < to[0] && to[0] < x + w && y < to[1] && to[1] < y + h && w < 8.0 && h < 8.0);
     }
     // Fractions of a picture stay fractions, also of one of another shape.
-    let wide = Lens::new((640, 480), [400.0, 800.0], [320.0, 240.0], Distortion::default()).unwrap();
+    let wide =
+        Lens::new((640, 480), [400.0, 800.0], [320.0, 240.0], Distortion::default()).unwrap();
     let at = Keypoints::new(vec![Keypoint::new("nose", [160.0, 120.0], 1.0)]).unwrap();
     let moved = at.in_image(640, 480).undistorted(&wide);
     assert_eq!(moved.size(), Some((1280, 480)));

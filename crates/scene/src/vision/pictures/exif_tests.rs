@@ -35,8 +35,17 @@ pub(in crate::vision::pictures) fn chunk(orientation: u16, fields: &[(u16, Field
         }
     }
     let at = out.split_off(32);
-    [&out[..8], &2u16.to_le_bytes(), &out[8..], &[0; 4], &(fields.len() as u16).to_le_bytes(), &at, &[0; 4], &numbers]
-        .concat()
+    [
+        &out[..8],
+        &2u16.to_le_bytes(),
+        &out[8..],
+        &[0; 4],
+        &(fields.len() as u16).to_le_bytes(),
+        &at,
+        &[0; 4],
+        &numbers,
+    ]
+    .concat()
 }
 
 const F35: u16 = 0xA405;
@@ -74,10 +83,16 @@ fn or_by_the_pixels_of_the_sensor() {
 
 #[test]
 fn a_crop_states_no_lens() {
-    let of = |size| focal(&chunk(1, &[(F35, Short(28)), (0xA002, Short(4000)), (0xA003, Short(3000))]), size);
+    let of = |size| {
+        focal(&chunk(1, &[(F35, Short(28)), (0xA002, Short(4000)), (0xA003, Short(3000))]), size)
+    };
     assert!(of((4000, 3000)).is_some() && of((400, 300)).is_some() && of((300, 400)).is_some());
     assert_eq!(of((600, 400)), None, "of other proportions than stated");
-    assert_eq!(focal(&chunk(1, &[(F35, Short(28))]), (500, 430)), None, "of no camera's proportions");
+    assert_eq!(
+        focal(&chunk(1, &[(F35, Short(28))]), (500, 430)),
+        None,
+        "of no camera's proportions"
+    );
 }
 
 #[test]
