@@ -16,11 +16,11 @@ use pcadlang_inference::draws::{Column, DrawRow, Sink};
 use pcadlang_inference::{Checkpoint, Progress};
 use pcadlang_numerics::num::fnv1a;
 use pcadlang_report::checkpoint::SavedChain;
+use pcadlang_scene::cameras::{Asked, CameraFile, Seen, Standpoint};
 use pcadlang_scene::geom::{
     FileFrame, MeshFile, UpAxis, gltf as gltf_file, obj as obj_file, ply as ply_file,
     stl as stl_file,
 };
-use pcadlang_scene::render::Camera;
 use pcadlang_scene::vision::features::Query;
 use pcadlang_scene::vision::keypoints::People;
 use pcadlang_scene::vision::{Limits as Pixels, depth, mask, npy, photo};
@@ -209,16 +209,41 @@ pub fn array(bytes: &[u8]) {
     }
 }
 
-/// Tests a camera: the vectors of a camera that was read are finite.
+/// Tests a camera: the first byte tells the file's name, the next two the length of the file beside
+/// it (COLMAP's other one), which comes before it. The axes of a camera that was read are a rotation,
+/// and its lens has a finite inverse.
 pub fn camera(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else { return };
-    match Camera::from_json(text) {
-        Ok(camera) => {
-            for v in [camera.eye, camera.right, camera.up, camera.forward] {
-                assert!(v.is_finite(), "{camera:?}");
+    let [kind, low, high, rest @ ..] = bytes else { return };
+    let names = ["camera", "cameras.txt", "images.txt", "cameras.bin", "images.bin"];
+    let name = names[usize::from(*kind) % names.len()];
+    let length = usize::from(u16::from_le_bytes([*low, *high])).min(rest.len());
+    let (other, own) = rest.split_at(length);
+    let plain = Asked::default();
+    let world = FileFrame::new(UpAxis::Z, 0.5).unwrap_or_default();
+    let first = Asked { picture: Some("1"), world, at: Some(Standpoint::File), ..plain };
+    for asked in
+        [plain, first, Asked { photo: Some("a/1.png"), at: Some(Standpoint::View), ..plain }]
+    {
+        let file = match CameraFile::read(name, own, &asked, &|_| Ok(other.to_vec())) {
+            Ok(file) => file,
+            Err(e) => {
+                assert!(!e.to_string().is_empty());
+                continue;
+            }
+        };
+        for size in [None, Some((64, 48))] {
+            let Ok(Seen { camera, lens }) = file.seen(size) else { continue };
+            let axes = [camera.right, camera.up, camera.forward];
+            assert!(camera.eye.is_finite() && axes.iter().all(|v| (v.length() - 1.0).abs() < 1e-6));
+            assert!((camera.right.cross(camera.up) + camera.forward).length() < 1e-6, "{camera:?}");
+            if let Some(lens) = lens.and_then(|l| l.scaled((64, 48))) {
+                let seen = lens.undistorted([10.0, 10.0]);
+                assert!(seen.is_none_or(|p| p.iter().all(|x| x.is_finite())), "{lens:?}");
+                let mask =
+                    mask::Mask::new(64, 48, vec![true; 64 * 48]).map(|m| m.undistorted(&lens));
+                assert!(mask.is_ok_and(|m| m.is_ok()));
             }
         }
-        Err(e) => assert!(!e.to_string().is_empty()),
     }
 }
 

@@ -7,6 +7,7 @@ use crate::python_code::Failure;
 use crate::values::{from_python, json};
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pcadlang::Value;
+use pcadlang_library::scene::camera_file::NamedCamera;
 use pcadlang_library::scene::{ImageValue, data};
 use pcadlang_scene::render::Camera;
 use pcadlang_scene::vision::{AxisHint, Hint, Limits, Mask, Photo, mask};
@@ -123,14 +124,17 @@ impl Program {
     }
 
     /// Sets the camera of views that have none: a dictionary as in camera files, or the path of
-    /// one.
+    /// one, as `--camera` takes it. What is observed is undistorted by its lens.
     fn camera(&self, camera: &Bound<'_, PyAny>) -> PyResult<Program> {
-        let text = match camera.extract::<PathBuf>() {
-            Ok(path) => std::fs::read_to_string(path)?,
-            Err(_) => dumps(camera)?,
+        let named = match camera.extract::<PathBuf>() {
+            Ok(path) => NamedCamera::parse(&path).and_then(|named| named.read(None)),
+            Err(_) => {
+                let camera = Camera::from_json(&dumps(camera)?).map_err(plain)?;
+                return Ok(self.changed(self.program.clone().camera(camera)));
+            }
         };
-        let camera = Camera::from_json(&text).map_err(plain)?;
-        Ok(self.changed(self.program.clone().camera(camera)))
+        let file = named.map_err(|f| PyValueError::new_err(f.message))?;
+        Ok(self.changed(self.program.clone().camera_file(file)))
     }
 
     /// Lets the program call what a host brings.

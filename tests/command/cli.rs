@@ -335,3 +335,43 @@ fn usage() {
         ],
     );
 }
+
+const CAMERAS_TXT: &str = "# Camera list
+1 OPENCV 640 480 520.5 518.75 321.75 240 -0.28 0.09 0.0012 -0.0007
+2 SIMPLE_PINHOLE 640 480 500 320 240
+3 OPENCV_FISHEYE 640 480 500 500 320 240 0.1 0 0 0
+";
+
+/// Pictures before, behind and at the origin; the last one is by a fisheye.
+const IMAGES_TXT: &str = "# Image list
+1 0.610243744639777 0.7625216441014687 -0.049258217842845925 -0.20913379062160758 0.1 -0.2 4 1 left/a.jpg
+
+2 1 0 0 0 0 0 -3 2 right/b.jpg
+
+3 1 0 0 0 0 0 4 3 right/c.jpg
+
+";
+
+#[test]
+fn cameras() {
+    let f = Folder::new("camera_files");
+    f.write("cameras.txt", CAMERAS_TXT).write("images.txt", IMAGES_TXT);
+    f.write(
+        "lens.json",
+        "{\"fx\": 600, \"fy\": 600, \"cx\": 319.5, \"cy\": 239.5, \"width\": 640, \"height\": 480}",
+    );
+    f.write("own.json", "{\"model\": \"pinhole\", \"focal\": 3}");
+    let all: [&[&str]; 8] = [
+        &["camera", "cameras.txt#a.jpg"],
+        &["camera", "images.txt", "--picture", "right/b.jpg", "--out", "axes.png"],
+        &["camera", "cameras.txt"],
+        &["camera", "cameras.txt#c.jpg"],
+        &["camera", "lens.json"],
+        &["camera", "lens.json, at = \"file\", up = \"-y\""],
+        &["camera", "lens.json, at = \"here\""],
+        &["camera", "own.json"],
+    ];
+    let text: Vec<String> = all.iter().map(|args| f.session(args)).collect();
+    assert_session("camera", &text.join("\n"));
+    assert!(f.files().contains(&"axes.png".to_owned()));
+}

@@ -192,12 +192,52 @@ fn bodies() -> Vec<Vec<u8>> {
     all
 }
 
-const CAMERAS: [&str; 2] = [
+const CAMERAS: [&str; 10] = [
     r#"{"model": "pinhole", "looks_along": [0, 0, -1], "up": [0, 1, 0], "position": [0, 0, 8], "image": [256, 256],
         "focal_px": 465.4, "principal_point": [128, 128]}"#,
     r#"{"model": "orthographic", "looks_along": [0, 1, -1], "up": [0, 0, 1], "image": [64, 48],
         "units_per_pixel": 0.02}"#,
+    "%YAML:1.0\n---\nimage_width: 64\nimage_height: 48\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   \
+        data: [ 50., 0., 31.5, 0., 51., 23.5, 0., 0., 1. ]\ndistortion_coefficients: [ -0.2, 0.1, 1e-3, -1e-3, 0.01 ]\n\
+        rvec: [ 1.5, 0, 0.1 ]\ntvec: [ 0, 0, 4 ]\n",
+    r#"{"mtx": [[50, 0, 31.5], [0, 50, 23.5], [0, 0, 1]], "dist": [0.1, 0, 0, 0, 0, 0.1, 0.2, 0.3]}"#,
+    r#"{"camera_angle_x": 0.9, "k1": 0.01, "frames": [{"file_path": "./a/1", "transform_matrix":
+        [[1, 0, 0, 0], [0, 0, -1, -4], [0, 1, 0, 1], [0, 0, 0, 1]]}]}"#,
+    r#"{"1": {"cam_K": [50, 0, 32, 0, 50, 24, 0, 0, 1], "cam_R_w2c": [1, 0, 0, 0, -1, 0, 0, 0, -1], "cam_t_w2c": [0, 0, 400],
+        "depth_scale": 0.1}}"#,
+    r#"{"class_name": "PinholeCameraTrajectory", "parameters": [{"extrinsic": [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 4, 1],
+        "intrinsic": {"height": 48, "width": 64, "intrinsic_matrix": [50, 0, 0, 0, 50, 0, 31.5, 23.5, 1]}}]}"#,
+    r#"{"color": {"fx": 50, "fy": 30, "ppx": 31, "ppy": 23, "width": 64, "height": 48, "model": "inverse_brown_conrady",
+        "coeffs": [0.1, -0.1, 0.001, 0, 0.01]}}"#,
+    r#"{"asset": {"version": "2.0"}, "nodes": [{"name": "1", "camera": 0, "translation": [0, 0, 5]}],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.8, "aspectRatio": 1.5}}]}"#,
+    "cam0:\n  camera_model: pinhole\n  intrinsics: [50, 50, 32, 24]\n  distortion_model: radtan\n  \
+        distortion_coeffs: [0.1, 0, 0, 0]\n  resolution: [64, 48]\n",
 ];
+
+/// Returns camera files, each behind its kind and the file beside it.
+fn cameras() -> Vec<Vec<u8>> {
+    let made = |kind: u8, other: &[u8], own: &[u8]| {
+        [&[kind], &(other.len() as u16).to_le_bytes()[..], other, own].concat()
+    };
+    let lenses = "# Camera list\n1 OPENCV 64 48 50 51 32 24 -0.2 0.1 0.001 -0.001\n2 SIMPLE_RADIAL 64 48 50 32 24 0.1\n";
+    let images = "# Image list\n1 1 0 0 0 0 0 4 1 a/1.png\n\n2 0 1 0 0 0 0 4 2 2.png\n1 2 -1\n";
+    let mut binary =
+        [1u64.to_le_bytes().as_slice(), &1u32.to_le_bytes(), &1u32.to_le_bytes()].concat();
+    binary.extend([64u64.to_le_bytes(), 48u64.to_le_bytes()].concat());
+    binary.extend([50.0f64, 51.0, 32.0, 24.0].map(f64::to_le_bytes).concat());
+    let mut taken = [1u64.to_le_bytes().as_slice(), &1u32.to_le_bytes()].concat();
+    taken.extend([1.0f64, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0].map(f64::to_le_bytes).concat());
+    taken.extend([&1u32.to_le_bytes()[..], b"1.png\0", &1u64.to_le_bytes(), &[0; 24]].concat());
+    let mut all: Vec<_> = CAMERAS.iter().map(|text| made(0, b"", text.as_bytes())).collect();
+    all.extend([
+        made(1, images.as_bytes(), lenses.as_bytes()),
+        made(2, lenses.as_bytes(), images.as_bytes()),
+        made(3, &taken, &binary),
+        made(4, &binary, &taken),
+    ]);
+    all
+}
 
 const OBJ: &str = "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0 1\nv 1 1 0\nf 1 2 3\ng b c\nf 1/1/1 2/2/2 3 4\nf -1 -2 -3\nvt 0 0\nvn 0 0 1\n\
     usemtl x\nmtllib x.mtl\ns off\nl 1 2\np 1\n";
@@ -314,7 +354,7 @@ fn seeds_of(target: &str) -> Vec<Vec<u8>> {
                 npy("<f8", "(1, 2)", &[0; 16]),
             ]
         }
-        "camera" => texts(&CAMERAS),
+        "camera" => cameras(),
         "studio" => texts(&REQUESTS),
         "trace" => {
             let model = targets::traced();
@@ -379,14 +419,13 @@ fn changed(seed: &[u8], x: &mut u64) -> Vec<u8> {
 /// Each target accepts its seeds, and each seed is valid, so that its mutations get
 /// beyond the first check.
 fn accepts_its_seeds(name: &str, target: Target) {
+    use pcadlang_scene::cameras::{Asked, CameraFile};
     use pcadlang_scene::geom::{FileFrame, gltf::load, obj, ply, stl};
-    use pcadlang_scene::render::Camera;
     use pcadlang_scene::vision::{Limits, depth, keypoints::People, photo};
     let all = seeds_of(name);
     assert!(!all.is_empty(), "{name}");
     for seed in &all {
         target(seed);
-        let text = || std::str::from_utf8(seed).unwrap();
         let good = match name {
             "obj" => obj::load(seed).is_ok(),
             "stl" => stl::indexed(seed).is_ok(),
@@ -401,7 +440,14 @@ fn accepts_its_seeds(name: &str, target: Target) {
             }
             "image" => photo::decode(seed, &Limits::default()).is_ok(),
             "array" => depth::decode(seed, Some(1.0), 0.0, &Limits::default()).is_ok(),
-            "camera" => Camera::from_json(text()).is_ok(),
+            "camera" => {
+                let names = ["camera", "cameras.txt", "images.txt", "cameras.bin", "images.bin"];
+                let (other, own) =
+                    seed[3..].split_at(usize::from(u16::from_le_bytes([seed[1], seed[2]])));
+                let asked = Asked { photo: Some("a/1.png"), ..Asked::default() };
+                let name = names[usize::from(seed[0])];
+                CameraFile::read(name, own, &asked, &|_| Ok(other.to_vec())).is_ok()
+            }
             "keypoints" => People::parse(seed).is_ok(),
             "network" => pcadlang_detectors::nn::Network::read(seed).is_ok(),
             "graph_model" => {

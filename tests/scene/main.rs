@@ -7,6 +7,7 @@ mod shipped;
 
 mod armature;
 mod caches;
+mod cameras;
 mod depths;
 mod drawing;
 mod gltf;

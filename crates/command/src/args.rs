@@ -3,6 +3,7 @@
 // Comments of arguments are the help that the command prints, not Markdown.
 #![allow(rustdoc::broken_intra_doc_links, rustdoc::invalid_html_tags, rustdoc::bare_urls)]
 
+use super::camera::CameraOf;
 use super::detect::Detect;
 use super::manual::{Completions, Man};
 use clap::{Args, Parser, Subcommand, ValueHint};
@@ -52,6 +53,8 @@ pub enum Command {
     Contours(Contours),
     /// Detect the people in a photograph
     Detect(Detect),
+    /// Print what is understood of a camera file, and draw the axes of its world
+    Camera(CameraOf),
     /// Explain a built-in, search the built-ins, or list them all
     Doc(Doc),
     /// Explore a program interactively; `:help` at the prompt lists the commands
@@ -369,8 +372,8 @@ pub struct Repl {
     /// Set a `param`; the value is written as in a program; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair, requires = "program")]
     pub sets: Vec<(String, String)>,
-    /// The camera, a JSON file
-    #[arg(long, value_name = "FILE", requires = "program")]
+    /// The camera, as of `run`
+    #[arg(long, value_name = "FILE[#PICTURE]", requires = "program")]
     pub camera: Option<PathBuf>,
     /// A file for a `data` item; the name may be omitted if only one item fits
     #[arg(long, value_name = "[NAME=]FILE", requires = "program")]

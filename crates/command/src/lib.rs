@@ -6,6 +6,7 @@
 extern crate pcadlang_runs;
 
 mod args;
+mod camera;
 mod contours;
 mod detect;
 mod evaluate;
@@ -51,6 +52,7 @@ pub fn command(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Predict(a) => predict::predict(&a),
         Command::Contours(a) => contours::contours(&a),
         Command::Detect(a) => detect::detect(&a),
+        Command::Camera(a) => camera::camera(&a),
         Command::Doc(a) => doc::doc(&a),
         Command::Repl(a) => repl::repl(&a),
         Command::Fmt(a) => fmt::fmt(&a),

@@ -24,8 +24,9 @@ pub struct Inputs {
     /// Set a `param`; the value is written as in a program; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = pair)]
     pub sets: Vec<(String, String)>,
-    /// The camera, a JSON file; by default a view 4.4 units across at distance 8
-    #[arg(long, value_name = "FILE")]
+    /// The camera: a file of OpenCV, COLMAP, NeRF, BOP, Open3D and others, see `pcadlang camera`
+    /// [default: 4.4 units across, at distance 8 or by the lens that the photograph states]
+    #[arg(long, value_name = "FILE[#PICTURE][,OPTION=VALUE…]")]
     pub camera: Option<PathBuf>,
     /// A contour detector to replace colour gradients, in builds with the feature
     /// contour_detectors: a structured forest (model.yml.gz) or a network (.onnx). Options

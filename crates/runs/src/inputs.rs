@@ -8,15 +8,13 @@ use pcadlang_detectors::people::{PeopleFinder, networks};
 use pcadlang_engine::lang::builtins::data::Options;
 use pcadlang_engine::lang::value::Value;
 use pcadlang_engine::trace::Limits as Bounds;
+use pcadlang_library::scene::camera_file::{NamedCamera, kind_options};
 use pcadlang_library::scene::{self, DetectorValue, ImageValue};
 use pcadlang_library::{Model, Program, standard};
+use pcadlang_scene::cameras::CameraFile;
 use pcadlang_scene::render::Camera;
 use pcadlang_scene::vision::{self, ContourMap, Photo};
-use pcadlang_syntax::ast::{ExprKind, ItemKind};
-use pcadlang_syntax::parse;
-use pcadlang_syntax::span::FileId;
 use std::borrow::Cow;
-use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -55,12 +53,51 @@ impl Ready {
 /// Reads and compiles a program; the time of a run begins here.
 pub fn prepare(job: &Job, quiet: bool) -> Result<Ready, Failure> {
     let begun = Instant::now();
-    prepare_program(self::program(&job.inputs, quiet)?, job, begun)
+    let program = program_of(job, quiet)?;
+    let photo = picture_of(&program, job);
+    let ready = prepare_program(program, job, begun)?;
+    if !quiet {
+        camera_notes(&ready, photo.as_deref(), job)?;
+    }
+    Ok(ready)
+}
+
+/// Says what a user should know of the run's camera.
+fn camera_notes(ready: &Ready, photo: Option<&str>, job: &Job) -> Result<(), Failure> {
+    let stated = ready.photo().and_then(|p| Some((p, p.focal()?)));
+    if let (None, Some((photo, focal))) = (&job.inputs.camera, stated) {
+        let Camera { eye, .. } = Camera::default_by(photo.width(), photo.height(), focal);
+        error_line!(
+            "note: by its Exif data the photograph has a lens of {focal:.2} times its longer side; the \
+             default view is from distance {:.2}, not 8",
+            eye.z
+        );
+    }
+    if let Some(spec) = &job.inputs.camera {
+        let file = camera(spec, None, photo)?;
+        for remark in &file.remarks {
+            error_line!("note: {}: {remark}", spec.display());
+        }
+        if file.seen(None).is_ok_and(|s| s.lens.is_some()) {
+            error_line!(
+                "note: pictures, masks, depths and keypoints are undistorted; results are of the \
+                 undistorted photograph"
+            );
+        }
+    }
+    Ok(())
 }
 
 /// Compiles a program that was read for a job; the time of a run began at `begun`.
 pub fn prepare_program(program: Program, job: &Job, begun: Instant) -> Result<Ready, Failure> {
     let (program, image) = observe(program, job)?;
+    let image = match image {
+        Some((name, value)) => {
+            let adapted = program.adapted(&name)?.unwrap_or(value);
+            Some((name, adapted))
+        }
+        None => None,
+    };
     let chooses = program.interface().params.iter().any(|p| p.name == "person");
     Ok(Ready { model: program.compile()?, named_image: image, chooses, begun })
 }
@@ -76,8 +113,55 @@ fn typed(allowed: &[PathBuf]) -> Result<Program, Failure> {
     Ok(allowed.iter().try_fold(program, |p, folder| p.allow_read(folder))?)
 }
 
+/// Opens the program of a job. In a camera file of several pictures, the photograph's path
+/// selects one.
+pub fn program_of(job: &Job, quiet: bool) -> Result<Program, Failure> {
+    let program = without_camera(&job.inputs, quiet)?;
+    let photo = picture_of(&program, job);
+    with_camera(program, &job.inputs, photo.as_deref())
+}
+
 /// Opens the program, with its parameters and camera.
 pub fn program(inputs: &Inputs, quiet: bool) -> Result<Program, Failure> {
+    with_camera(without_camera(inputs, quiet)?, inputs, None)
+}
+
+fn with_camera(program: Program, inputs: &Inputs, photo: Option<&str>) -> Result<Program, Failure> {
+    match &inputs.camera {
+        Some(spec) => Ok(program.camera_file(camera(spec, None, photo)?)),
+        None => Ok(program),
+    }
+}
+
+/// Reads the camera of `FILE[#PICTURE][, OPTION = VALUE, …]`, of a picture, or else that of a
+/// photograph by its path.
+pub fn camera(
+    spec: &Path,
+    picture: Option<&str>,
+    photo: Option<&str>,
+) -> Result<CameraFile, Failure> {
+    let read = NamedCamera::parse(spec).and_then(|named| named.of(picture).read(photo));
+    read.map_err(|f| Failure::Plain(f.message, f.hint))
+}
+
+/// Returns what a camera of the command line depends on: the bytes of its files, and the options.
+pub fn camera_bytes(spec: &Path) -> Vec<u8> {
+    NamedCamera::parse(spec).map_or_else(|_| Vec::new(), |named| named.bytes())
+}
+
+/// The path of the first picture that a job observes.
+fn picture_of(program: &Program, job: &Job) -> Option<String> {
+    let data = program.interface().data;
+    let is_picture = |name: &str| {
+        let kind = data.iter().find(|d| d.name == name).and_then(|d| d.ty.as_deref());
+        matches!(kind, Some("image" | "mask" | "depth"))
+    };
+    let mut all = job.observe.iter().filter_map(|spec| named(program, spec).ok());
+    all.find(|(name, _)| is_picture(name)).map(|(_, path)| path)
+}
+
+/// Opens the program, with its parameters.
+pub fn without_camera(inputs: &Inputs, quiet: bool) -> Result<Program, Failure> {
     let mut program = match &*inputs.program {
         STDIN => typed(&inputs.allowed.allow_read)?,
         path => Program::open_allowing(path, &inputs.allowed.allow_read)?,
@@ -103,11 +187,6 @@ pub fn program(inputs: &Inputs, quiet: bool) -> Result<Program, Failure> {
     }
     if let Some(spec) = &inputs.edges {
         program = program.detector(detector(spec)?);
-    }
-    if let Some(path) = &inputs.camera {
-        let wrong = |why: &dyn Display| plain(format!("{}: {why}", path.display()));
-        let text = String::from_utf8(files::read(path)?).map_err(|_| wrong(&"not text"))?;
-        program = program.camera(Camera::from_json(&text).map_err(|e| wrong(&e))?);
     }
     Ok(program)
 }
@@ -303,28 +382,12 @@ pub fn detector(spec: &str) -> Result<DetectorValue, Failure> {
 
 /// Parses options such as `colours = "bgr", white = 255` as the arguments of a call.
 fn detector_options(text: &str) -> Result<Options, Failure> {
-    if text.is_empty() {
-        return Ok(Options::default());
-    }
-    let wrong = |why: &str, hint: Option<String>| {
-        let hint = hint.or_else(|| {
+    kind_options("detector", text).map_err(|f| {
+        let hint = f.hint.or_else(|| {
             Some("for example --edges 'network.onnx, colours = \"bgr\", white = 255'".into())
         });
-        Failure::Plain(format!("--edges: {why} (`{text}`)"), hint)
-    };
-    let (program, errors) = parse(&format!("data d = detector({text});"), FileId(0));
-    let args = match program.items.first().map(|i| &i.kind) {
-        Some(ItemKind::Data(d)) if errors.is_empty() && program.items.len() == 1 => {
-            match d.default.as_ref().map(|e| &e.kind) {
-                Some(ExprKind::Call { args, .. }) => Some(args),
-                _ => None,
-            }
-        }
-        _ => None,
-    };
-    let args =
-        args.ok_or_else(|| wrong("expected the options of a detector after the file name", None))?;
-    standard::table().options("detector", args).map_err(|(_, f)| wrong(&f.message, f.hint))
+        Failure::Plain(format!("--edges: {} (`{text}`)", f.message), hint)
+    })
 }
 
 /// Returns what contours depend on besides the picture: the bytes of the file, and the

@@ -22,9 +22,12 @@ pub fn inputs_hash(job: &Job, model: &Model) -> Result<String, Failure> {
         .iter()
         .map(|o| inputs::file_of(o))
         .chain(job.keypoints.as_deref().map(inputs::file_of));
-    let plain = [&job.observe_contours, &job.inputs.camera].into_iter().flatten();
+    let plain = job.observe_contours.iter();
     for path in named.map(Path::new).chain(plain.map(|p| p.as_path())) {
         all.push_str(&bytes_hash(&files::read(path)?));
+    }
+    if let Some(spec) = &job.inputs.camera {
+        all.push_str(&bytes_hash(&inputs::camera_bytes(spec)));
     }
     if job.inputs.edges.is_some() {
         all.push_str(&bytes_hash(&inputs::detector_bytes(job.inputs.edges.as_deref())?));

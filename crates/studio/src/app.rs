@@ -199,7 +199,7 @@ impl App {
                 self.permit(&o.observe)?;
                 self.permit(o.photo.as_slice())?;
                 let mut job = job_of(program, &o.set, &o.observe);
-                let read = inputs::program(&job.inputs, true)?;
+                let read = inputs::program_of(&job, true)?;
                 job.observe.extend(suited(&read, &[], o.photo.as_deref()));
                 match self.sessions.open(job.clone(), None) {
                     Ok(handle) => handle,

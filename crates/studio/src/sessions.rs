@@ -176,7 +176,7 @@ impl OpenSession {
         let stop = Stop::when(stop);
         match run {
             Some(run) => OpenSession::of_run(&run, job.sampling.seed, stop),
-            None => OpenSession::of(inputs::program(&job.inputs, true)?, job, stop),
+            None => OpenSession::of(inputs::program_of(&job, true)?, job, stop),
         }
     }
 
@@ -235,7 +235,7 @@ impl OpenSession {
     ) -> Result<(), Failure> {
         let mut job = Job { observe, ..self.job.clone() };
         job.inputs.hint = HintArgs::default();
-        let read = inputs::program(&job.inputs, true)?;
+        let read = inputs::program_of(&job, true)?;
         let program = match read.text() == text {
             true => read,
             false => read.edited(text)?,

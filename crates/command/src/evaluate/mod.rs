@@ -105,7 +105,7 @@ impl<'a> Evaluation<'a> {
     fn prepare(a: &'a Evaluate) -> Result<Evaluation<'a>, Failure> {
         let Dataset { layout, cases, skipped } = Dataset::open(&a.dataset)?;
         dataset::known(&a.dataset, &a.only, cases.iter().map(|c| c.name.as_str()))?;
-        let program = inputs::program(&a.inputs, a.quiet)?;
+        let program = inputs::without_camera(&a.inputs, a.quiet)?;
         let hash = program.hash();
         let detections = a.keypoints.clone().map(Detections::open).transpose()?;
         let items = Items::of(&program, detections.is_some())?;

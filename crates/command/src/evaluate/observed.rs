@@ -3,7 +3,7 @@
 use super::dataset::Case;
 use pcadlang_library::Program;
 use pcadlang_runs::failure::{Failure, plain};
-use pcadlang_runs::files;
+use pcadlang_runs::{files, inputs};
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 
@@ -56,7 +56,7 @@ pub fn observations_for(case: &Case, detections: Option<&Detections>) -> Vec<Obs
 pub fn bytes(case: &Case, detections: Option<&Detections>) -> Vec<u8> {
     // A file that cannot be read is reported when the case is run.
     let mut all = std::fs::read(&case.image).unwrap_or_default();
-    all.extend(case.camera.as_ref().and_then(|c| std::fs::read(c).ok()).unwrap_or_default());
+    all.extend(case.camera.as_ref().map(|c| inputs::camera_bytes(c)).unwrap_or_default());
     all.extend(
         detections
             .and_then(|d| d.of(&case.name))

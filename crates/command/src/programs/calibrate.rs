@@ -28,7 +28,7 @@ pub fn calibrate(a: &Check) -> Result<(), Failure> {
     let mut failed = Vec::new();
     for path in &a.programs {
         let job = job(a, path);
-        let (program, _) = inputs::observe(inputs::program(&job.inputs, false)?, &job)?;
+        let (program, _) = inputs::observe(inputs::program_of(&job, false)?, &job)?;
         let model = program.compile()?;
         let mut passes = true;
         if a.sbc {

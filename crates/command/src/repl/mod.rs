@@ -58,7 +58,7 @@ fn open(a: &Repl, stop: Stop) -> Result<(Session, Reply), Failure> {
         return Reopened::open(Path::new(path))?.session(a.seed, stop);
     }
     let job = job(a, path);
-    let (program, _) = inputs::observe(inputs::program(&job.inputs, false)?, &job)?;
+    let (program, _) = inputs::observe(inputs::program_of(&job, false)?, &job)?;
     Session::open(program, a.seed, stop)
 }
 

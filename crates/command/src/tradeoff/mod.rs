@@ -102,7 +102,7 @@ impl<'a> Measurement<'a> {
     /// Prepares a measurement, and reports all errors in its input before the first run.
     fn prepare(a: &'a Tradeoff) -> Result<Measurement<'a>, Failure> {
         a.inputs.hint.none_for("tradeoff")?;
-        let program = inputs::program(&a.inputs, a.quiet)?;
+        let program = inputs::without_camera(&a.inputs, a.quiet)?;
         let Settings { all: settings, candidates } = settings::read(a)?;
         let hashes = settings::programs(a, &settings)?;
         let mut cases = cases::open(a, &program)?;

@@ -46,7 +46,7 @@ pub fn programs(a: &Tradeoff, settings: &[Setting]) -> Result<Map<String, Value>
     for setting in settings {
         let name = setting.program.as_deref().unwrap_or(&a.inputs.program);
         let inputs = Inputs { program: name.to_owned(), sets: Vec::new(), ..a.inputs.clone() };
-        let mut other = inputs::program(&inputs, true)?;
+        let mut other = inputs::without_camera(&inputs, true)?;
         hashes.insert(name.to_owned(), json!(other.hash()));
         for (param, value) in a.inputs.sets.iter().cloned().chain(setting.set.clone()) {
             other = other.set(&param, &value);

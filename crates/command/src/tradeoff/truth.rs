@@ -2,7 +2,8 @@
 
 use indexmap::IndexMap;
 use pcadlang_runs::failure::{Failure, plain};
-use pcadlang_runs::files;
+use pcadlang_runs::{files, inputs};
+use pcadlang_scene::cameras::Seen;
 use pcadlang_scene::render::{Camera, Projection};
 use pcadlang_scene::vision::npy::{self, NpyArray};
 use pcadlang_workbench::score::{JointsTruth, Normal, Reference, Surface, SurfaceTruth};
@@ -107,8 +108,8 @@ pub fn surface(folder: &Path, camera: Option<&Path>) -> Result<Option<SurfaceTru
 /// Returns the camera scaled to a picture's size, or the default camera.
 fn seen_by(camera: Option<&Path>, width: u32, height: u32) -> Result<Camera, Failure> {
     let Some(path) = camera else { return Ok(Camera::default_for(width, height)) };
-    let text = String::from_utf8_lossy(&files::read(path)?).into_owned();
-    let camera = Camera::from_json(&text).map_err(|e| plain(format!("{}: {e}", path.display())))?;
+    let seen = inputs::camera(path, None, None)?.seen(Some((width, height)));
+    let Seen { camera, .. } = seen.map_err(|e| plain(format!("{}: {e}", path.display())))?;
     Ok(camera.scaled_to(width.max(height)))
 }
 

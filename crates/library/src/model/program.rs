@@ -263,18 +263,39 @@ impl Program {
         self
     }
 
+    /// Lets hosts complete and adapt what was given, once.
+    fn prepare(&mut self) -> Result<(), Error> {
+        let builtins = Arc::clone(&self.builtins);
+        for hook in &builtins.hooks {
+            let prepared = hook.prepare(&mut self.data, &mut self.defaults);
+            prepared.map_err(|f| plain_error(f, &self.sources))?;
+        }
+        let adapted =
+            |v: &Value| builtins.hooks.iter().fold(v.clone(), |v, h| h.adapt(v, &self.defaults));
+        self.data.values_mut().for_each(|v| *v = adapted(v));
+        Ok(())
+    }
+
+    /// Returns a `data` item that was set as the compiled model has it.
+    ///
+    /// # Errors
+    /// As [`Program::compile`], of what was set.
+    #[doc(hidden)]
+    pub fn adapted(&self, name: &str) -> Result<Option<Value>, Error> {
+        let mut all = self.clone();
+        all.prepare()?;
+        Ok(all.data.get(name).cloned())
+    }
+
     /// Checks and lowers the program.
     ///
     /// # Errors
     /// All errors in the program.
     pub fn compile(mut self) -> Result<Model, Error> {
         let builtins = Arc::clone(&self.builtins);
-        for hook in &builtins.hooks {
-            hook.prepare(&mut self.data, &mut self.defaults);
-        }
+        self.prepare()?;
         let adapted =
             |v: Value| builtins.hooks.iter().fold(v, |v, hook| hook.adapt(v, &self.defaults));
-        self.data.values_mut().for_each(|v| *v = adapted(v.clone()));
         let (reach, files) = (&self.reach, &*self.files);
         let data_hash = RefCell::new(String::new());
         let read_data = |kind: &str, path: &str, folder: &str, options: &Options| {

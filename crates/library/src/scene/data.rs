@@ -41,6 +41,16 @@ const MESH_POSE: Arg = word(
      which the mesh was bound to the joints.",
 );
 
+/// The frame of a camera's file.
+pub(super) const FRAME_OPTIONS: [Arg; 2] = [
+    word(
+        "up",
+        &["y", "x", "z", "-y"],
+        "The up axis of the file's world; it is rotated to +y. A camera's own frame has \"-y\" up.",
+    ),
+    UNIT,
+];
+
 const NETWORK: &[Arg] = &[
     opt("file", Type::Str, "none", "The path, relative to the program's folder."),
     word("colours", &["rgb", "bgr"], "The order of the network's input channels."),
@@ -128,6 +138,7 @@ pub(super) const TABLE: &[Row] = &[
         || Arc::new(DepthFile),
     ),
     DETECTOR,
+    super::camera_file::ROW,
     kind(
         "armature",
         &[PATH, UP, UNIT, BODY_POSE],
@@ -407,7 +418,7 @@ pub fn load_keypoints(file: &str, bytes: &[u8], picture: Option<&str>) -> Result
 ///
 /// # Errors
 /// A value that does not fit: a message for the user.
-fn how(options: &Options) -> Result<As, String> {
+pub(super) fn how(options: &Options) -> Result<As, String> {
     let (mut up, mut unit, mut pose) = (UpAxis::default(), 1.0, None);
     for (name, value) in options.iter() {
         match (name, value) {
@@ -416,6 +427,7 @@ fn how(options: &Options) -> Result<As, String> {
                     "x" => UpAxis::X,
                     "y" => UpAxis::Y,
                     "z" => UpAxis::Z,
+                    "-y" => UpAxis::MinusY,
                     other => {
                         return Err(format!("`up` must be \"x\", \"y\" or \"z\", not \"{other}\""));
                     }

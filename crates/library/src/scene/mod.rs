@@ -7,6 +7,7 @@
 
 mod adjoints;
 mod bodies;
+pub mod camera_file;
 mod candidates;
 mod compare;
 mod compare_depths;

@@ -9,6 +9,7 @@ use pcadlang_engine::lang::value::{Object, Value};
 use pcadlang_scene::geom::armature::Armature;
 use pcadlang_scene::geom::{Affine, Solid, outer};
 use pcadlang_scene::render::{Camera, View};
+use pcadlang_scene::vision::Lens;
 use std::any::Any;
 use std::sync::Arc;
 
@@ -170,9 +171,16 @@ impl Object for ArmatureValue {
     }
 }
 
-/// A camera.
+/// A camera; with the lens by which photographs are undistorted to suit it, if it is the run's.
 #[derive(Clone, Debug)]
-pub struct CameraValue(pub Camera);
+pub struct CameraValue(pub Camera, pub(super) Option<Lens>);
+
+impl CameraValue {
+    /// Creates a camera whose photographs need no undistortion.
+    pub fn new(camera: Camera) -> Self {
+        CameraValue(camera, None)
+    }
+}
 
 impl Object for CameraValue {
     fn type_name(&self) -> &'static str {
@@ -181,6 +189,10 @@ impl Object for CameraValue {
 
     fn as_any(&self) -> &dyn Any {
         self
+    }
+
+    fn field(&self, name: &str) -> Option<Value> {
+        (name == "position").then(|| xyz(self.0.eye.to_array()))
     }
 
     fn summary(&self) -> Option<String> {
@@ -204,7 +216,7 @@ impl Object for ViewValue {
     fn field(&self, name: &str) -> Option<Value> {
         match name {
             "solid" => Some(Value::object(SolidValue::new(self.0.solid().clone()))),
-            "camera" => Some(Value::object(CameraValue(*self.0.camera()))),
+            "camera" => Some(Value::object(CameraValue::new(*self.0.camera()))),
             _ => None,
         }
     }

@@ -9,8 +9,8 @@ use pcadlang_engine::lang::builtins::{Domain, Row, Type, arg, int, num, opt};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::{Object, Value};
 use pcadlang_scene::vision::{
-    ContourDetector, ContourMap, GradientDetector, Hint, Keypoints, MAP_SIZE, MOST_MAP_SIZE, Photo,
-    SoftMap,
+    ContourDetector, ContourMap, GradientDetector, Hint, Keypoints, Lens, MAP_SIZE, MOST_MAP_SIZE,
+    Photo, SoftMap, VisionError,
 };
 use std::any::Any;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -116,6 +116,9 @@ impl ImageValue {
     /// (docs/measurements/objects.md).
     pub(super) const STRONG: f32 = 0.4;
 
+    /// The focal length of the default view in longer sides of the picture, as programs write it.
+    const USUAL_FOCAL: f64 = 1.818;
+
     /// The longer side of pictures to look at in pixels: more show no more of a scene that is
     /// compared at a few hundred.
     pub const SHOWN: u32 = 1600;
@@ -184,6 +187,29 @@ impl ImageValue {
         let otherwise = self.prepared().first::<Detected, Picture>();
         let picture = otherwise.as_ref().unwrap_or(&self.picture);
         picture.map.get()?.as_ref().ok().cloned()
+    }
+
+    /// Returns the focal length that the photograph states, in its longer sides.
+    pub(super) fn focal(&self) -> Option<f64> {
+        self.as_photo()?.focal()
+    }
+
+    /// Returns the image as the pinhole of a lens would have it, with its hint; made once. `None`
+    /// if it is not of the lens's proportions.
+    pub(super) fn undistorted(&self, lens: &Lens) -> Option<ImageValue> {
+        let picture = self.prepared().get(lens.clone(), |lens| {
+            let fault = |e: VisionError| Fault::new(FaultKind::Other, e.to_string());
+            let photo = self.as_photo().map(|p| p.undistorted(lens)).transpose().map_err(fault)?;
+            let Picture { ready, map, .. } = &*self.picture;
+            match map.get() {
+                Some(Ok(map)) if *ready => {
+                    Ok(Picture::contours(map.undistorted(lens).map_err(fault)?, photo))
+                }
+                _ => Ok(Picture { photo, ..Picture::default() }),
+            }
+        });
+        let hint = self.hint.undistorted(lens, self.size()).ok()?;
+        Some(ImageValue { picture: picture.ok()?, hint })
     }
 
     /// Returns the image with `by` as the detector where the program does not choose one;
@@ -350,6 +376,8 @@ impl Object for ImageValue {
         match name {
             "width" => Some(Value::Num(f64::from(self.size().0))),
             "height" => Some(Value::Num(f64::from(self.size().1))),
+            "focal" => Some(Value::Num(self.focal().unwrap_or(ImageValue::USUAL_FOCAL))),
+            "focal_sd" => Some(Value::Num(if self.focal().is_some() { 0.05 } else { 0.4 })),
             _ => None,
         }
     }

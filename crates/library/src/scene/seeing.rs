@@ -38,7 +38,7 @@ pub(super) const TABLE: &[Row] = &[
             let (focal, width, height) = (a.num("focal")?, a.int("width")?, a.int("height")?);
             let focal_px = focal * f64::from(width.max(height));
             let camera = Camera::looking_at(places, focal_px, (width, height));
-            camera.map(|c| Value::object(CameraValue(c))).ok_or_else(|| {
+            camera.map(|c| Value::object(CameraValue::new(c))).ok_or_else(|| {
                 Fault::domain(
                     "scene.camera: the viewing direction must not be zero or parallel to `up`",
                 )

@@ -129,7 +129,7 @@ impl Reopened {
     /// # Errors
     /// If it cannot be read.
     pub fn program(&self) -> Result<Program, Failure> {
-        let now = inputs::program(&self.job.inputs, true)?;
+        let now = inputs::program_of(&self.job, true)?;
         match std::fs::read_to_string(self.folder.join(PROGRAM)) {
             Ok(text) if text != now.text() => Ok(now.edited(&text)?),
             _ => Ok(now),

@@ -15,6 +15,8 @@ pub enum UpAxis {
     Y,
     /// +z.
     Z,
+    /// -y, as in a camera's own frame with y down and z forward.
+    MinusY,
 }
 
 /// The map from a file's coordinates to the scene's.
@@ -46,12 +48,13 @@ impl FileFrame {
     }
 
     /// Maps a file's point to the scene. With z up, x stays and the file's +y becomes -z;
-    /// with x up, z stays.
+    /// with x up, z stays; with -y up, x stays.
     pub fn apply(&self, p: DVec3) -> DVec3 {
         let turned = match self.up {
             UpAxis::X => DVec3::new(-p.y, p.x, p.z),
             UpAxis::Y => p,
             UpAxis::Z => DVec3::new(p.x, p.z, -p.y),
+            UpAxis::MinusY => DVec3::new(p.x, -p.y, -p.z),
         };
         turned * self.unit
     }
@@ -63,7 +66,12 @@ mod tests {
 
     #[test]
     fn up_becomes_y_and_hands_stay() {
-        for (up, axis) in [(UpAxis::X, DVec3::X), (UpAxis::Y, DVec3::Y), (UpAxis::Z, DVec3::Z)] {
+        for (up, axis) in [
+            (UpAxis::X, DVec3::X),
+            (UpAxis::Y, DVec3::Y),
+            (UpAxis::Z, DVec3::Z),
+            (UpAxis::MinusY, -DVec3::Y),
+        ] {
             let f = FileFrame::new(up, 0.5).unwrap();
             assert_eq!(f.apply(axis), DVec3::Y * 0.5);
             let [x, y, z] = DVec3::AXES.map(|a| f.apply(a) * 2.0);

@@ -18,6 +18,17 @@ pub enum CameraError {
     /// The document is JSON, but not an object.
     #[error("a camera file holds one JSON object")]
     NotAnObject,
+    /// A key that is not one of this program's cameras.
+    #[error("the camera file has an unknown key `{key}`{}; `note` and `name` are for remarks", near(.nearest))]
+    Unknown {
+        /// The key.
+        key: String,
+        /// The known key nearest to it, if one is near.
+        nearest: Option<&'static str>,
+    },
+    /// Another program's file that cannot be read, and why.
+    #[error("{0}")]
+    Other(String),
     /// A key that this model needs is missing.
     #[error("the camera file has no `{0}`")]
     Missing(&'static str),
@@ -29,6 +40,17 @@ pub enum CameraError {
         /// The values that are accepted.
         wanted: &'static str,
     },
+}
+
+impl CameraError {
+    /// An error in a file of another program.
+    pub(crate) fn other(why: impl Into<String>) -> CameraError {
+        CameraError::Other(why.into())
+    }
+}
+
+fn near(key: &Option<&str>) -> String {
+    key.map_or_else(String::new, |k| format!("; did you mean `{k}`?"))
 }
 
 /// How camera coordinates become pixels.

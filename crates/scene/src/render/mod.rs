@@ -5,7 +5,6 @@
 //! machine.
 
 mod camera;
-mod camera_json;
 mod canvas;
 mod derivatives;
 mod image_bounds;
@@ -19,6 +18,8 @@ mod work;
 mod extremes_tests;
 #[cfg(test)]
 mod testing;
+#[cfg(test)]
+pub(crate) use testing::cases;
 
 use pcadlang_numerics::num::simd;
 

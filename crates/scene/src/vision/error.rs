@@ -44,6 +44,17 @@ pub enum VisionError {
     /// Something pointed out in a photograph that cannot be there.
     #[error("{0}")]
     Hint(String),
+    /// A picture that the camera's lens cannot have taken.
+    #[error(
+        "the camera is of a picture of {} x {} pixels, this one has {} x {}: the proportions differ",
+        lens.0, lens.1, picture.0, picture.1
+    )]
+    Lens {
+        /// Width and height of the pictures of the lens.
+        lens: (u32, u32),
+        /// Width and height of the picture.
+        picture: (u32, u32),
+    },
     /// Two pictures that must have the same size do not.
     #[error("sizes differ: expected {expected_width} x {expected_height} pixels, got {got}")]
     Size {

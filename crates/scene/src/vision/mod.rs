@@ -18,11 +18,13 @@ pub mod error;
 pub mod features;
 pub mod hint;
 pub mod keypoints;
+pub mod lens;
 pub mod mask;
 mod mask_outlines;
 pub mod pictures;
 pub mod region;
 pub mod segmentation;
+mod undistort;
 
 #[cfg(test)]
 mod drawn;
@@ -41,6 +43,7 @@ pub use elements::ComparatorError;
 pub use error::VisionError;
 pub use hint::{AxisHint, Hint};
 pub use keypoints::{KeypointLikelihood, KeypointOptions, Keypoints};
+pub use lens::{Distortion, Lens, Pinhole};
 pub use mask::{Mask, MaskLikelihood};
 pub use pictures::contour_map::ContourMap;
 pub use pictures::photo::{Limits, Photo};

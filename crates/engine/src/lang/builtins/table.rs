@@ -3,6 +3,7 @@
 //! This is not a scope: lowering handles names in the program that shadow them.
 
 use super::{Builtin, Text};
+use crate::lang::error::Fault;
 use crate::lang::value::Value;
 use indexmap::{Equivalent, IndexMap};
 use rustc_hash::{FxBuildHasher, FxHashMap};
@@ -65,7 +66,14 @@ pub type Defaults = FxHashMap<(String, String), Value>;
 /// Prepares a program's inputs for a host before the program is compiled.
 pub trait InputHook: fmt::Debug + Send + Sync {
     /// Completes the `data` items that were given and the defaults of arguments.
-    fn prepare(&self, data: &mut IndexMap<String, Value>, defaults: &mut Defaults);
+    ///
+    /// # Errors
+    /// If they do not suit each other: a message for the user.
+    fn prepare(
+        &self,
+        data: &mut IndexMap<String, Value>,
+        defaults: &mut Defaults,
+    ) -> Result<(), Fault>;
 
     /// Adapts the value of a `data` item, whether it was given or is read from a file.
     fn adapt(&self, value: Value, defaults: &Defaults) -> Value;

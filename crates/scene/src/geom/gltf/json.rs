@@ -18,6 +18,8 @@ pub(super) struct Document {
     #[serde(default)]
     pub skins: Vec<JsonSkin>,
     #[serde(default)]
+    pub cameras: Vec<JsonCamera>,
+    #[serde(default)]
     pub accessors: Vec<Accessor>,
     #[serde(default)]
     pub buffer_views: Vec<BufferView>,
@@ -49,6 +51,7 @@ pub(super) struct Node {
     pub children: Vec<usize>,
     pub mesh: Option<usize>,
     pub skin: Option<usize>,
+    pub camera: Option<usize>,
     pub matrix: Option<[f64; 16]>,
     pub translation: Option<[f64; 3]>,
     pub rotation: Option<[f64; 4]>,
@@ -117,6 +120,18 @@ pub(super) struct Draco {
 pub(super) struct JsonSkin {
     pub inverse_bind_matrices: Option<usize>,
     pub joints: Vec<usize>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct JsonCamera {
+    pub perspective: Option<Perspective>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Perspective {
+    pub yfov: f64,
+    pub aspect_ratio: Option<f64>,
 }
 
 #[derive(Deserialize)]

@@ -3,11 +3,12 @@
 //!
 //! Supports `.glb` and `.gltf`, with buffers in the file, in other files, or in `data:`
 //! URIs; sparse accessors; views compressed with meshopt and primitives compressed with
-//! Draco; copies of a node's mesh. Materials, the file's own normals, cameras and animations
-//! are ignored. Invariant: every index is checked before it is used, so no input can cause a
-//! panic.
+//! Draco; copies of a node's mesh. Materials, the file's own normals and animations are
+//! ignored; cameras are read apart, by [`cameras`]. Invariant: every index is checked before it
+//! is used, so no input can cause a panic.
 
 mod access;
+mod cameras;
 mod container;
 mod draco;
 mod extensions;
@@ -21,6 +22,7 @@ mod skin;
 #[cfg(test)]
 mod tests;
 
+pub use cameras::{GltfCamera, cameras};
 pub use container::{Read, is_gltf};
 pub use morphs::LoadedMorph;
 

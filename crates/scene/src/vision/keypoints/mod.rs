@@ -29,6 +29,7 @@ mod openpose;
 mod people;
 mod relative_depth;
 mod tables;
+mod undistort;
 
 #[cfg(test)]
 mod calibration_tests;

@@ -2,6 +2,7 @@
 
 pub mod color;
 pub mod contour_map;
+mod exif;
 pub(crate) mod floats;
 pub mod npy;
 pub(crate) mod palette;

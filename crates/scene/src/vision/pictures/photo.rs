@@ -3,6 +3,7 @@
 //! is upright (Exif orientation applied), is opaque (alpha composited over white in sRGB
 //! values, as viewers do) and has at least one pixel.
 
+use super::exif;
 use crate::vision::error::VisionError;
 use crate::vision::pictures::color::{linear_table, linear_to_byte, linear_to_srgb};
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, RgbImage};
@@ -50,7 +51,7 @@ impl Limits {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Photo {
     rgb: RgbImage,
-    focal_35mm: Option<f64>,
+    focal: Option<f64>,
 }
 
 /// A picture in linear light (sRGB primaries, 0..=1).
@@ -68,7 +69,7 @@ impl Photo {
     /// Wraps sRGB pixels; an error if there are none.
     pub fn from_rgb(rgb: RgbImage) -> Result<Self, VisionError> {
         Limits { max_side: u32::MAX, max_pixels: u64::MAX }.check(rgb.width(), rgb.height())?;
-        Ok(Photo { rgb, focal_35mm: None })
+        Ok(Photo { rgb, focal: None })
     }
 
     /// Width, pixels.
@@ -86,10 +87,10 @@ impl Photo {
         &self.rgb
     }
 
-    /// The 35 mm equivalent focal length recorded by the camera, mm (for a frame of 36 mm
-    /// x 24 mm).
-    pub fn focal_35mm(&self) -> Option<f64> {
-        self.focal_35mm
+    /// The focal length that the camera recorded, in longer sides of the picture; `None` also if
+    /// the picture was cropped.
+    pub fn focal(&self) -> Option<f64> {
+        self.focal
     }
 
     /// Returns the picture in linear light at `width` x `height` pixels, area-averaged.
@@ -141,18 +142,18 @@ impl Photo {
         for (p, v) in rgb.pixels_mut().zip(&linear.rgb) {
             p.0 = v.map(linear_to_byte);
         }
-        Photo { rgb, focal_35mm: self.focal_35mm }
+        Photo { rgb, focal: self.focal }
     }
 }
 
 /// Reads a photograph from the bytes of a PNG or JPEG file.
 pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Photo, VisionError> {
-    let (picture, focal_35mm) = decode_dynamic(bytes, limits)?;
-    Ok(Photo { rgb: over_white(picture), focal_35mm })
+    let (picture, focal) = decode_dynamic(bytes, limits)?;
+    Ok(Photo { rgb: over_white(picture), focal })
 }
 
 /// Decodes a picture, upright, in the file's own pixel format, and the camera's focal
-/// length.
+/// length in longer sides.
 pub(crate) fn decode_dynamic(
     bytes: &[u8],
     limits: &Limits,
@@ -176,7 +177,8 @@ pub(crate) fn decode_dynamic(
     }
     // Damaged metadata count as missing.
     let orientation = decoder.orientation().unwrap_or(image::metadata::Orientation::NoTransforms);
-    let focal = decoder.exif_metadata().ok().flatten().and_then(|chunk| focal_35mm(&chunk));
+    let chunk = decoder.exif_metadata().ok().flatten();
+    let focal = chunk.and_then(|chunk| exif::focal(&chunk, (width, height)));
     let mut picture = DynamicImage::from_decoder(decoder).map_err(cause)?;
     picture.apply_orientation(orientation);
     Ok((picture, focal))
@@ -284,56 +286,6 @@ fn over_white(picture: DynamicImage) -> RgbImage {
             rgb
         }
         other => other.into_rgb8(),
-    }
-}
-
-// The one piece of metadata that helps to place the camera: the 35 mm equivalent focal length
-// (Exif 2.3, tag 0xA405). Damaged metadata count as missing: they never make a picture
-// unreadable.
-
-/// TIFF bytes with a byte order.
-struct Tiff<'a> {
-    bytes: &'a [u8],
-    big: bool,
-}
-
-impl Tiff<'_> {
-    fn u16(&self, at: usize) -> Option<u16> {
-        let b: [u8; 2] = self.bytes.get(at..at.checked_add(2)?)?.try_into().ok()?;
-        Some(if self.big { u16::from_be_bytes(b) } else { u16::from_le_bytes(b) })
-    }
-
-    fn u32(&self, at: usize) -> Option<u32> {
-        let b: [u8; 4] = self.bytes.get(at..at.checked_add(4)?)?.try_into().ok()?;
-        Some(if self.big { u32::from_be_bytes(b) } else { u32::from_le_bytes(b) })
-    }
-
-    /// Returns the value of a one-number entry (SHORT or LONG) of the directory at `at`.
-    fn entry(&self, at: usize, tag: u16) -> Option<u32> {
-        let count = usize::from(self.u16(at)?);
-        let found = (0..count).map(|i| at + 2 + 12 * i).find(|&e| self.u16(e) == Some(tag))?;
-        match self.u16(found + 2)? {
-            3 => self.u16(found + 8).map(u32::from),
-            4 => self.u32(found + 8),
-            _ => None,
-        }
-    }
-}
-
-/// Returns the 35 mm equivalent focal length in mm of an Exif chunk (a TIFF structure),
-/// if present.
-fn focal_35mm(chunk: &[u8]) -> Option<f64> {
-    let chunk = chunk.strip_prefix(b"Exif\0\0").unwrap_or(chunk);
-    let big = match chunk.get(..4)? {
-        b"MM\0\x2a" => true,
-        b"II\x2a\0" => false,
-        _ => return None,
-    };
-    let tiff = Tiff { bytes: chunk, big };
-    let exif = tiff.entry(tiff.u32(4)? as usize, 0x8769)?;
-    match tiff.entry(exif as usize, 0xA405)? {
-        0 => None,
-        mm => Some(f64::from(mm)),
     }
 }
 

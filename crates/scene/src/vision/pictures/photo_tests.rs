@@ -99,23 +99,29 @@ fn palettes() {
 
 #[test]
 fn orientation_and_focal_length() {
+    use crate::vision::pictures::exif::tests::{Field, chunk as exif};
+    let chunk_of = |orientation| exif(orientation, &[(0xA405, Field::Short(28))]);
     let rgb =
-        RgbImage::from_fn(32, 16, |i, _| if i < 16 { Rgb([255, 0, 0]) } else { Rgb([0, 0, 255]) });
+        RgbImage::from_fn(32, 24, |i, _| if i < 16 { Rgb([255, 0, 0]) } else { Rgb([0, 0, 255]) });
     let jpeg = encoded(rgb, ImageFormat::Jpeg);
     let with = |orientation| {
-        let body = [b"Exif\0\0".as_slice(), &exif_chunk(orientation, 28)].concat();
+        let body = [b"Exif\0\0".as_slice(), &chunk_of(orientation)].concat();
         let length = (body.len() as u16 + 2).to_be_bytes();
         [&jpeg[..2], &[0xff, 0xe1], &length, &body, &jpeg[2..]].concat()
     };
     let red = |p: &Photo, x, y| p.rgb().get_pixel(x, y).0[0] > 128;
     let photo = read(&with(1)).unwrap();
-    assert_eq!((photo.width(), photo.height(), photo.focal_35mm()), (32, 16, Some(28.0)));
+    assert_eq!((photo.width(), photo.height()), (32, 24));
+    // 28 mm, by the diagonals: 40 pixels for 43.27 mm.
+    assert!((photo.focal().unwrap() * 32.0 - 28.0 / 43.2666 * 40.0).abs() < 1e-3);
+    assert_eq!(photo.shrunk(8).focal(), photo.focal());
     assert!(red(&photo, 3, 8) && !red(&photo, 28, 8));
     let photo = read(&with(3)).unwrap();
     assert!(!red(&photo, 3, 8) && red(&photo, 28, 8));
     // 6: rotated clockwise by a quarter turn, so the left side is at the top.
     let photo = read(&with(6)).unwrap();
-    assert_eq!((photo.width(), photo.height()), (16, 32));
+    assert_eq!((photo.width(), photo.height()), (24, 32));
+    assert!(photo.focal().is_some());
     assert!(red(&photo, 8, 3) && !red(&photo, 8, 28));
     let photo = read(&with(8)).unwrap();
     assert!(!red(&photo, 8, 3) && red(&photo, 8, 28));
@@ -192,46 +198,6 @@ fn shrinking_is_in_linear_light() {
     assert_eq!(stripes.shrunk(64), stripes);
     assert_eq!(stripes.linear(1, 1).rgb.len(), 1);
     assert!(Photo::from_rgb(RgbImage::new(0, 3)).is_err());
-}
-
-/// A little-endian Exif chunk with an orientation and a focal length, for tests.
-fn exif_chunk(orientation: u16, focal: u16) -> Vec<u8> {
-    let mut out = b"II\x2a\0\x08\0\0\0".to_vec();
-    let entry = |out: &mut Vec<u8>, tag: u16, kind: u16, value: u32| {
-        out.extend(tag.to_le_bytes());
-        out.extend(kind.to_le_bytes());
-        out.extend(1u32.to_le_bytes());
-        out.extend(value.to_le_bytes());
-    };
-    out.extend(2u16.to_le_bytes());
-    entry(&mut out, 0x0112, 3, u32::from(orientation));
-    entry(&mut out, 0x8769, 4, 38);
-    out.extend([0; 4]);
-    out.extend(1u16.to_le_bytes());
-    entry(&mut out, 0xA405, 3, u32::from(focal));
-    out.extend([0; 4]);
-    out
-}
-
-#[test]
-fn focal_length_is_found() {
-    assert_eq!(focal_35mm(&exif_chunk(1, 28)), Some(28.0));
-    assert_eq!(focal_35mm(&[b"Exif\0\0".as_slice(), &exif_chunk(1, 50)].concat()), Some(50.0));
-    assert_eq!(focal_35mm(&exif_chunk(1, 0)), None);
-}
-
-#[test]
-fn damaged_chunks_are_none() {
-    let good = exif_chunk(6, 35);
-    for n in 0..good.len() - 4 {
-        // The last four bytes (next directory) are not needed; the value ends right
-        // before them.
-        let cut = focal_35mm(&good[..n]);
-        assert!(cut.is_none() || n >= good.len() - 6, "{n}");
-    }
-    let mut wild = good;
-    wild[4..8].copy_from_slice(&u32::MAX.to_le_bytes());
-    assert_eq!(focal_35mm(&wild), None);
 }
 
 fn resize(w: u32, h: u32, data: &[f32], to: (u32, u32)) -> Vec<f32> {

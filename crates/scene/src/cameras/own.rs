@@ -1,13 +1,14 @@
-//! Cameras from JSON.
+//! This program's own cameras, as JSON.
 //!
 //! Keys: `model` (`pinhole` or `orthographic`), `position`, `looks_along`, `up`
 //! (triples), `image` (width and height in pixels), `principal_point` (pixels), and
 //! `focal_px` or `units_per_pixel`. A missing `principal_point` is the image centre; a
-//! missing `position` of an orthographic camera is 8 units before the origin. Other keys
-//! are ignored. This is not a general scene format. The result is always a valid
-//! [`Camera`].
+//! missing `position` of an orthographic camera is 8 units before the origin. `note` and `name`
+//! are for remarks, `depth_scale` for the depth maps beside a camera; any other key is an error.
+//! The result is always a valid [`Camera`].
 
-use super::{Camera, CameraError, Projection};
+use super::document::bare;
+use crate::render::{Camera, CameraError, Projection};
 use glam::DVec3;
 use serde_json::{Map, Value};
 
@@ -17,59 +18,122 @@ const DEFAULT_DISTANCE: f64 = 8.0;
 /// Largest accepted magnitude of a number.
 const LARGEST: f64 = 1e12;
 
+/// The keys.
+const KEYS: [&str; 11] = [
+    "model",
+    "position",
+    "looks_along",
+    "up",
+    "image",
+    "principal_point",
+    "focal_px",
+    "units_per_pixel",
+    "note",
+    "name",
+    "depth_scale",
+];
+
 impl Camera {
-    /// Parses the text of a camera file.
+    /// Parses the text of a camera file of this program's own; [`CameraFile`](super::CameraFile)
+    /// reads those of others, too.
     ///
     /// # Errors
-    /// The text is not a JSON object, or a required key is missing or its value cannot be
-    /// used; the error names the key.
+    /// The text is not a JSON object, a required key is missing or its value cannot be
+    /// used, or a key is not known; the error names the key.
     pub fn from_json(text: &str) -> Result<Camera, CameraError> {
         let document: Value =
             serde_json::from_str(text).map_err(|e| CameraError::Json(e.to_string()))?;
-        let map = document.as_object().ok_or(CameraError::NotAnObject)?;
-        let pinhole = match map.get("model").ok_or(CameraError::Missing("model"))?.as_str() {
-            Some("pinhole") => true,
-            Some("orthographic") => false,
-            _ => {
-                return Err(CameraError::Invalid {
-                    key: "model",
-                    wanted: "\"pinhole\" or \"orthographic\"",
-                });
-            }
-        };
-        let forward = direction(map, "looks_along")?;
-        let right = forward.cross(direction(map, "up")?);
-        if right.length() < 1e-6 {
+        read(document.as_object().ok_or(CameraError::NotAnObject)?)
+    }
+}
+
+pub(super) fn read(map: &Map<String, Value>) -> Result<Camera, CameraError> {
+    if let Some(key) = map.keys().find(|k| !KEYS.contains(&k.as_str())) {
+        return Err(CameraError::Unknown { key: key.clone(), nearest: nearest(key) });
+    }
+    let pinhole = match map.get("model").ok_or(CameraError::Missing("model"))?.as_str() {
+        Some("pinhole") => true,
+        Some("orthographic") => false,
+        _ => {
             return Err(CameraError::Invalid {
-                key: "up",
-                wanted: "a direction other than `looks_along`'s",
+                key: "model",
+                wanted: "\"pinhole\" or \"orthographic\"",
             });
         }
-        let right = right.normalize();
-        let eye = match triple(map, "position") {
-            Err(CameraError::Missing(_)) if !pinhole => -DEFAULT_DISTANCE * forward,
-            other => other?,
-        };
-        let (width, height) = image(map)?;
-        let (cx, cy) = match map.get("principal_point") {
-            None => (f64::from(width) / 2.0, f64::from(height) / 2.0),
-            Some(value) => match numbers(value).as_deref() {
-                Some([x, y]) => (*x, *y),
-                _ => {
-                    return Err(CameraError::Invalid {
-                        key: "principal_point",
-                        wanted: "two numbers (pixels)",
-                    });
-                }
-            },
-        };
-        let projection = if pinhole {
-            Projection::Pinhole { focal_px: positive(map, "focal_px")?, cx, cy }
-        } else {
-            Projection::Orthographic { units_per_pixel: positive(map, "units_per_pixel")?, cx, cy }
-        };
-        Ok(Camera { eye, right, up: right.cross(forward), forward, width, height, projection })
+    };
+    let forward = direction(map, "looks_along")?;
+    let right = forward.cross(direction(map, "up")?);
+    if right.length() < 1e-6 {
+        return Err(CameraError::Invalid {
+            key: "up",
+            wanted: "a direction other than `looks_along`'s",
+        });
     }
+    let right = right.normalize();
+    let eye = match triple(map, "position") {
+        Err(CameraError::Missing(_)) if !pinhole => -DEFAULT_DISTANCE * forward,
+        other => other?,
+    };
+    let (width, height) = image(map)?;
+    let (cx, cy) = match map.get("principal_point") {
+        None => (f64::from(width) / 2.0, f64::from(height) / 2.0),
+        Some(value) => match numbers(value).as_deref() {
+            Some([x, y]) => (*x, *y),
+            _ => {
+                return Err(CameraError::Invalid {
+                    key: "principal_point",
+                    wanted: "two numbers (pixels)",
+                });
+            }
+        },
+    };
+    let projection = if pinhole {
+        Projection::Pinhole { focal_px: positive(map, "focal_px")?, cx, cy }
+    } else {
+        Projection::Orthographic { units_per_pixel: positive(map, "units_per_pixel")?, cx, cy }
+    };
+    Ok(Camera { eye, right, up: right.cross(forward), forward, width, height, projection })
+}
+
+/// The known key that begins like another, or has the same letters but for a third; names of
+/// other programs for the same things count, too.
+fn nearest(key: &str) -> Option<&'static str> {
+    const OTHERS: [(&str, &str); 12] = [
+        ("width", "image"),
+        ("height", "image"),
+        ("size", "image"),
+        ("resolution", "image"),
+        ("eye", "position"),
+        ("centre", "position"),
+        ("center", "position"),
+        ("forward", "looks_along"),
+        ("direction", "looks_along"),
+        ("lookat", "looks_along"),
+        ("focal", "focal_px"),
+        ("comment", "note"),
+    ];
+    let bare = bare(&key.chars().take(64).collect::<String>());
+    let known = KEYS.iter().map(|k| (super::document::bare(k), *k));
+    let all = known.chain(OTHERS.iter().map(|(a, b)| ((*a).to_owned(), *b)));
+    let changed = |name: &str| match name.len() > 3 && bare.starts_with(name) {
+        true => 0,
+        false => letters_changed(&bare, name),
+    };
+    let near = all.map(|(name, k)| (changed(&name), name.len(), k));
+    near.filter(|(d, n, _)| 3 * d <= *n.max(&bare.len())).min().map(|(_, _, k)| k)
+}
+
+/// The number of letters to insert, leave out or replace (Levenshtein).
+fn letters_changed(a: &str, b: &str) -> usize {
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.bytes().enumerate() {
+        let mut before = std::mem::replace(&mut row[0], i + 1);
+        for (j, y) in b.bytes().enumerate() {
+            let here = (before + usize::from(x != y)).min(row[j] + 1).min(row[j + 1] + 1);
+            before = std::mem::replace(&mut row[j + 1], here);
+        }
+    }
+    row[b.len()]
 }
 
 /// The numbers of an array; `None` unless all are at most [`LARGEST`] in magnitude.
@@ -118,10 +182,10 @@ fn image(map: &Map<String, Value>) -> Result<(u32, u32), CameraError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::testing::cases;
+    use crate::render::cases;
 
     const GOOD: &str = r#"{"model": "pinhole", "position": [0, 0, 8.0], "looks_along": [0, 0, -1], "up": [0, 1, 0],
-        "image": [256, 200], "focal_px": 465.5, "principal_point": [120.0, 90.5], "note": "ignored"}"#;
+        "image": [256, 200], "focal_px": 465.5, "principal_point": [120.0, 90.5], "note": "for people"}"#;
 
     #[test]
     fn reads_a_pinhole() {
@@ -160,7 +224,11 @@ mod tests {
         let message = |text: &str| Camera::from_json(text).unwrap_err().to_string();
         for key in ["model", "position", "looks_along", "up", "image", "focal_px"] {
             assert_eq!(
-                message(&GOOD.replace(&format!("\"{key}\""), "\"x\"")),
+                message(
+                    &GOOD
+                        .replace("\"note\"", "\"name\"")
+                        .replace(&format!("\"{key}\""), "\"note\"")
+                ),
                 format!("the camera file has no `{key}`")
             );
         }
@@ -183,6 +251,28 @@ mod tests {
         assert!(message("{").starts_with("the camera file is not valid JSON"));
         assert_eq!(Camera::from_json("[1]"), Err(CameraError::NotAnObject));
         assert!(message(&GOOD.replace("465.5", "1e999")).len() > 5);
+    }
+
+    #[test]
+    fn unknown_keys_are_errors_with_the_nearest() {
+        for (key, nearest) in [
+            ("focal", Some("focal_px")),
+            ("focal_length_px", Some("focal_px")),
+            ("Position", Some("position")),
+            ("look_along", Some("looks_along")),
+            ("width", Some("image")),
+            ("principalPoint", Some("principal_point")),
+            ("zzz", None),
+        ] {
+            let text = GOOD.replace("\"note\"", &format!("{key:?}"));
+            let unknown = CameraError::Unknown { key: key.into(), nearest };
+            assert_eq!(Camera::from_json(&text), Err(unknown), "{key}");
+        }
+        let said = Camera::from_json(&GOOD.replace("note", "focal")).unwrap_err().to_string();
+        assert_eq!(
+            said,
+            "the camera file has an unknown key `focal`; did you mean `focal_px`?; `note` and `name` are for remarks"
+        );
     }
 
     #[test]
