@@ -128,8 +128,10 @@ fn what_is_written_here_reads_back() {
     }
     let m = sphere(0.5, 5).unwrap();
     let frame = FileFrame::new(UpAxis::Z, 0.5).unwrap();
-    let by_gltf =
-        load(&glb_file::write(&[m.clone().into()]), &frame, Pose::Bind, &none).unwrap().mesh().unwrap();
+    let by_gltf = load(&glb_file::write(&[m.clone().into()]), &frame, Pose::Bind, &none)
+        .unwrap()
+        .mesh()
+        .unwrap();
     assert_eq!(
         faces(&by_gltf),
         faces(&obj::load_in(obj::write(&[m.into()]).as_bytes(), &frame).unwrap())
@@ -351,7 +353,7 @@ fn broken_skins_are_refused() {
         fails(&rows, &|d| d["skins"][0]["inverseBindMatrices"] = 0.into()),
         "accessor 0 of the glTF file must be of type MAT4, not VEC3"
     );
-    let flat = read(&glb_file::write(&cuboid(DVec3::ONE).unwrap()))
+    let flat = read(&glb_file::write(&[cuboid(DVec3::ONE).unwrap().into()]))
         .unwrap()
         .armature()
         .unwrap_err()
@@ -370,7 +372,7 @@ fn programs_read_them_with_options() {
     let body = body();
     let to_z = DMat3::from_cols(DVec3::X, DVec3::Z, -DVec3::Y) * 100.0;
     file("body.glb", &skinned(&body, to_z, &json!({})));
-    file("box.glb", &glb_file::write(&cuboid(DVec3::new(100.0, 200.0, 300.0)).unwrap()));
+    file("box.glb", &glb_file::write(&[cuboid(DVec3::new(100.0, 200.0, 300.0)).unwrap().into()]));
     file(
         "other.obj",
         obj::write(&[cuboid(DVec3::new(100.0, 200.0, 500.0)).unwrap().into()]).as_bytes(),
@@ -449,7 +451,7 @@ fn no_bytes_make_it_stumble() {
     let made = |name: &str| std::fs::read(format!("{folder}/{name}")).unwrap();
     let originals = [
         files::packed(&d, &bytes),
-        glb_file::write(&cuboid(DVec3::ONE).unwrap()),
+        glb_file::write(&[cuboid(DVec3::ONE).unwrap().into()]),
         files::everything(),
         made("meshopt_copies.glb"),
         made("meshopt_khr.glb"),

@@ -44,16 +44,20 @@ fn a_mesh_that_is_inside_out_is_turned_over_and_said() {
     let rig = format!(
         r#"{{"mesh": "wrong.obj", "joints": [{{"name": "a", "head": [0, 0, 0]}}], "weights": [{weights}]}}"#
     );
-    folder.write("right.obj", obj::write(&cube)).write("wrong.obj", obj::write(&wrong));
-    folder.write("wrong.glb", glb::write(&wrong)).write("a.rig.json", rig);
+    folder
+        .write("right.obj", obj::write(&[cube.clone().into()]))
+        .write("wrong.obj", obj::write(&[wrong.clone().into()]));
+    folder.write("wrong.glb", glb::write(&[wrong.clone().into()])).write("a.rig.json", rig);
     for read in ["mesh(\"wrong.obj\")", "mesh(\"wrong.glb\")", "armature(\"a.rig.json\")"] {
         let model = compile(&folder, &format!("data thing = {read};")).unwrap();
         assert!(warnings(&model).contains("the closed body is inside out"), "{read}");
     }
     let model = compile(&folder, "data thing = mesh(\"right.obj\");").unwrap();
     assert_eq!(warnings(&model), "");
-    for (file, bytes) in [("a.obj", obj::write(&wrong).into_bytes()), ("a.glb", glb::write(&wrong))]
-    {
+    for (file, bytes) in [
+        ("a.obj", obj::write(&[wrong.clone().into()]).into_bytes()),
+        ("a.glb", glb::write(&[wrong.clone().into()])),
+    ] {
         let beside = |_: &str| Err("no file".to_string());
         let read = standard::table().load("mesh", file, &bytes, &Options::default(), &beside);
         let read = read.unwrap_or_else(|e| panic!("{file}: {}", e.message));

@@ -12,9 +12,7 @@ use pcadlang_engine::lang::builtins::{Arg, Default, Row, Type, arg, flag, num, o
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
 use pcadlang_scene::geom::armature::{Armature, morphs_from_json, rig_from_json};
-use pcadlang_scene::geom::{
-    FileFrame, GeomError, MeshFile, Solid, UpAxis, face_outward, gltf, not_an_armature,
-};
+use pcadlang_scene::geom::{FileFrame, GeomError, MeshFile, Solid, UpAxis, gltf, not_an_armature};
 use pcadlang_scene::vision::keypoints::{self, Keypoints, People};
 use pcadlang_scene::vision::{ContourMap, Limits, VisionError, depth, mask, photo};
 use std::sync::Arc;
@@ -288,8 +286,8 @@ impl DataFormat for NoFiles {
 }
 
 /// How a file of a mesh or an armature is to be read.
-struct As {
-    frame: FileFrame,
+pub(super) struct As {
+    pub(super) frame: FileFrame,
     /// The pose, if the program says which.
     pose: Option<gltf::Pose>,
 }

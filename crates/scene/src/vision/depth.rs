@@ -98,7 +98,7 @@ fn numbers(bytes: &[u8], limits: &Limits) -> Result<Numbers, VisionError> {
         let (width, height) = array.picture_size()?;
         limits.check(width, height)?;
         let whole = !matches!(array.data, NpyData::F32(_) | NpyData::F64(_));
-        let values = array.into_f32().into_iter().map(f64::from).collect();
+        let values = array.into_f64();
         return Ok(Numbers { width, height, values, whole });
     }
     if floats::is_tiff(bytes) {
@@ -437,29 +437,37 @@ mod tests {
         let mut png = std::io::Cursor::new(Vec::new());
         image::DynamicImage::ImageLuma16(grey).write_to(&mut png, image::ImageFormat::Png).unwrap();
         let limits = Limits::default();
-        let map = decode(png.get_ref(), 4096.0, 0.0, &limits).unwrap();
+        let map = decode(png.get_ref(), Some(4096.0), 0.0, &limits).unwrap();
         assert!(map.data()[0].is_nan() && map.data()[1] == 2.0, "0 is not measured");
-        let map = decode(png.get_ref(), 4096.0, f64::NAN, &limits).unwrap();
+        let map = decode(png.get_ref(), Some(4096.0), f64::NAN, &limits).unwrap();
         assert_eq!(map.data(), [INF, 2.0], "unless nothing is missing");
-        let map = decode(png.get_ref(), 4096.0, 8192.0, &limits).unwrap();
+        let map = decode(png.get_ref(), Some(4096.0), 8192.0, &limits).unwrap();
         assert!(map.data()[0] == INF && map.data()[1].is_nan());
-        assert!(decode(png.get_ref(), 0.0, 0.0, &limits).is_err());
+        assert!(decode(png.get_ref(), Some(0.0), 0.0, &limits).is_err());
         let mut bits = std::io::Cursor::new(Vec::new());
         let grey = image::GrayImage::from_raw(2, 1, vec![0, 200]).unwrap();
         image::DynamicImage::from(grey).write_to(&mut bits, image::ImageFormat::Png).unwrap();
-        assert!(decode(bits.get_ref(), 1000.0, 0.0, &limits).is_err(), "8 bits are no depths");
+        assert!(
+            decode(bits.get_ref(), Some(1000.0), 0.0, &limits).is_err(),
+            "8 bits are no depths"
+        );
         let body: Vec<u8> =
             [0.0f32, -1.0, 3.0, f32::NAN].iter().flat_map(|v| v.to_le_bytes()).collect();
-        let map = decode(&npy::bytes_of(1, "<f4", "False", "(2, 2)", &body), 1.0, -1.0, &limits);
+        let map =
+            decode(&npy::bytes_of(1, "<f4", "False", "(2, 2)", &body), Some(1.0), -1.0, &limits);
         let map = map.unwrap();
         assert!(map.data()[0] == INF && map.data()[1].is_nan() && map.data()[2] == 3.0);
         let wide: Vec<u8> = [0u16, 65_535].iter().flat_map(|v| v.to_le_bytes()).collect();
         let wide = npy::bytes_of(1, "<u2", "False", "(1, 2)", &wide);
-        assert_eq!(decode(&wide, 65.535, 0.0, &limits).unwrap().data()[1], 1000.0);
+        assert_eq!(decode(&wide, Some(65.535), 0.0, &limits).unwrap().data()[1], 1000.0);
         let body: Vec<u8> =
             [0.0f32, -1.0, 3.0, f32::NAN].iter().flat_map(|v| v.to_le_bytes()).collect();
-        let map =
-            decode(&npy::bytes_of(1, "<f4", "False", "(2, 2)", &body), 1.0, f64::NAN, &limits);
+        let map = decode(
+            &npy::bytes_of(1, "<f4", "False", "(2, 2)", &body),
+            Some(1.0),
+            f64::NAN,
+            &limits,
+        );
         let map = map.unwrap();
         assert!(map.data()[..3] == [INF, INF, 3.0] && map.data()[3].is_nan());
         let big = map.resized(4, 4);

@@ -45,7 +45,7 @@ impl NpyArray {
     pub fn into_f64(self) -> Vec<f64> {
         match self.data {
             NpyData::F32(v) => v.into_iter().map(f64::from).collect(),
-            NpyData::F64(v) => v,
+            NpyData::F64(v) | NpyData::Whole(v) => v,
             NpyData::U8(v) => v.into_iter().map(f64::from).collect(),
             NpyData::Bool(v) => v.into_iter().map(|x| f64::from(u8::from(x))).collect(),
         }
