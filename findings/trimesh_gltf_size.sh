@@ -39,8 +39,9 @@ def write(path, positions, component, normalized, more, node=None, mesh=None, ex
             views[0]["byteStride"] = 8
         accessors.append({"bufferView": k, "componentType": component, "count": len(a), "type": kind})
         data += a.tobytes()
-    low, high = positions[:, :3].min(0).tolist(), positions[:, :3].max(0).tolist()
-    accessors[0] |= {"min": low, "max": high} | ({"normalized": True} if normalized else {})
+        if kind == "VEC3":
+            accessors[k] |= {"min": a[:, :3].min(0).tolist(), "max": a[:, :3].max(0).tolist()}
+    accessors[0] |= {"normalized": True} if normalized else {}
     primitive = {"attributes": {"POSITION": 0}, "indices": 1} | (mesh or {}).pop("primitive", {})
     d = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0} | (node or {})],
          "meshes": [{"primitives": [primitive]} | (mesh or {})], "accessors": accessors, "bufferViews": views,

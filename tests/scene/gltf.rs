@@ -427,6 +427,19 @@ fn programs_read_them_with_options() {
         let said = fails(data);
         assert!(said.contains(says), "{data}: {said}");
     }
+    // What a file's reader remarks is a warning of the program.
+    file("posed.glb", &files::everything());
+    for (data, says) in [
+        (r#"mesh("posed.glb")"#, "the glTF file is posed: the pose of its nodes is read"),
+        (r#"mesh("posed.glb", pose = "bind")"#, "its bind pose is read"),
+        (r#"armature("posed.glb")"#, "its bind pose is read"),
+        (r#"armature("posed.glb", pose = "file")"#, "the pose of its nodes is read"),
+    ] {
+        let model =
+            program(&format!("data d = {data};\nassume x ~ normal(0, 1);")).compile().unwrap();
+        let said: Vec<String> = model.warnings().1.iter().map(|w| w.message.clone()).collect();
+        assert!(said.iter().any(|w| w.contains(says)), "{data}: {said:?}");
+    }
     // Options are checked even if another file is given.
     let wrong = program("data d = mesh(\"box.glb\", unit = -1);\nassume x ~ normal(0, 1);");
     let said = wrong.observe_file("d", &path("other.obj")).unwrap().compile().unwrap_err();

@@ -88,8 +88,8 @@ pub fn load(bytes: &[u8], frame: &FileFrame, pose: Pose, read: &Read) -> Result<
         |c: &json::Channel| c.target.node.is_some_and(|n| nodes.drawn.get(n) == Some(&true));
     if pose == Pose::File && document.animations.iter().any(|a| a.channels.iter().any(moves)) {
         loaded.remarks.push(
-            "the animations of the glTF file are not read; its nodes are where the file has them \
-             without"
+            "the animations of the glTF file are not read, only the pose that its nodes have \
+             without them"
                 .into(),
         );
     }
