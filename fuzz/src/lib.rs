@@ -117,7 +117,7 @@ pub fn obj(bytes: &[u8]) {
     let indexed = obj_file::indexed(bytes);
     if let Ok(mesh) = obj_file::load(bytes) {
         assert!(indexed.is_ok_and(|i| i.triangles.len() >= mesh.topology.triangles.len()));
-        let again = obj_file::load(obj_file::write(&[mesh.into()]).as_bytes());
+        let again = obj_file::load(obj_file::write(&[mesh.clone().into()]).as_bytes());
         assert!(again.is_ok_and(|m| m.topology.triangles.len() == mesh.topology.triangles.len()));
         data("mesh", "x.obj", bytes, &[]);
     }

@@ -353,7 +353,7 @@ fn broken_skins_are_refused() {
         fails(&rows, &|d| d["skins"][0]["inverseBindMatrices"] = 0.into()),
         "accessor 0 of the glTF file must be of type MAT4, not VEC3"
     );
-    let flat = read(&glb_file::write(&cuboid(DVec3::ONE).unwrap()))
+    let flat = read(&glb_file::write(&[cuboid(DVec3::ONE).unwrap().into()]))
         .unwrap()
         .armature()
         .unwrap_err()
@@ -372,7 +372,7 @@ fn programs_read_them_with_options() {
     let body = body();
     let to_z = DMat3::from_cols(DVec3::X, DVec3::Z, -DVec3::Y) * 100.0;
     file("body.glb", &skinned(&body, to_z, &json!({})));
-    file("box.glb", &glb_file::write(&cuboid(DVec3::new(100.0, 200.0, 300.0)).unwrap()));
+    file("box.glb", &glb_file::write(&[cuboid(DVec3::new(100.0, 200.0, 300.0)).unwrap().into()]));
     file(
         "other.obj",
         obj::write(&[cuboid(DVec3::new(100.0, 200.0, 500.0)).unwrap().into()]).as_bytes(),
@@ -445,7 +445,8 @@ fn next(state: &mut u64) -> usize {
 #[test]
 fn no_bytes_make_it_stumble() {
     let (bytes, d) = two(&[[0.1, 0.2, 0.3, 0.0, 0.25, 0.15, 0.0, 0.0]; 4]);
-    let originals = [files::packed(&d, &bytes), glb_file::write(&cuboid(DVec3::ONE).unwrap())];
+    let originals =
+        [files::packed(&d, &bytes), glb_file::write(&[cuboid(DVec3::ONE).unwrap().into()])];
     let mut state = 0x1234_5678_9abc_def1u64;
     let (mut good, mut bad) = (0, 0);
     for round in 0..2000 {
