@@ -14,8 +14,8 @@ pub struct FilmFrame {
 }
 
 /// Returns a film as an animated PNG file that plays again and again. Of each picture only
-/// what differs from the one before is stored. A program that does not play it shows `still`,
-/// which is no part of the film.
+/// what differs from the one before is stored. A program that does not play it shows `still`;
+/// the film itself does not.
 ///
 /// # Errors
 /// If there are no pictures, or they differ in size.

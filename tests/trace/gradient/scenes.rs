@@ -98,6 +98,8 @@ fn photo() -> Value {
 fn pictures_pull_where_their_score_rises() {
     let group = "scene.group([scene.lathe(profile), scene.affine(translate = [0, 2 * r, 0]) * scene.sphere(0.2)])";
     pull(group, false);
+    let named = "scene.group({ vase: scene.lathe(profile), ball: scene.affine(translate = [0, 2 * r, 0]) * scene.sphere(0.2) })";
+    pull(named, false);
 }
 
 #[test]
@@ -135,7 +137,7 @@ fn pull(object: &str, round: bool) {
              let profile = {{ y: r * h, r: r * (0.6 + 0.25 * sin(2.5 * h)) }};
              let solid = scene.centred({object});
              let placed = scene.affine(translate = [x, y, 0], rotate = [t, 0.2, 0.4]) * solid;
-             assume view = scene.render(placed);
+             assume view = scene.render(placed, metre = 1 + r);
              observe {likelihood} = photo as picture;"
         );
         let program = Program::parse(&text).unwrap().observe("photo", seen);
