@@ -12,6 +12,7 @@
 //! transform of the mesh's node or of the root's parent, or the identity, as exporters have it
 //! ([`usual`]).
 
+use super::Pose;
 use super::access::{Data, F32, U8, U16};
 use super::container::name_of;
 use super::draco::Contents;
