@@ -92,7 +92,7 @@ impl<'a> Generator<'a> {
         if self.coin() { spanned(self.of(&WORDS).into()) } else { self.name() }
     }
 
-    fn key(&mut self) -> Name {
+    fn field_key(&mut self) -> Name {
         if self.coin() { self.word() } else { spanned(self.text()) }
     }
 
@@ -258,7 +258,7 @@ impl<'a> Generator<'a> {
             3 => ExprKind::Address(Address { segments: self.many(1, Self::segment) }),
             4 => ExprKind::TagSel { name: self.word().node, value: self.tag_value() },
             5 => ExprKind::Array(self.many(0, Self::expr)),
-            6 => ExprKind::Record(self.many(0, |g| (g.key(), g.expr()))),
+            6 => ExprKind::Record(self.many(0, |g| (g.field_key(), g.expr()))),
             7 => ExprKind::Call {
                 callee: self.boxed(),
                 args: self.many(0, |g| Arg { name: g.maybe(Self::name), value: g.expr() }),
