@@ -320,7 +320,7 @@ fn what_is_said_of_keypoints_that_are_wrong() {
         .write("nan.json", "{\"nose\": [NaN, 2]}")
         .write("odd.json", "[1, 2]");
     f.write("tail.json", "{\"nose\": [1, 2], \"l_ankel\": [3, 4]}")
-        .write("sure.json", "{\"nose\": [1, 2, 7]}");
+        .write("sure.json", "{\"nose\": [1, 2, -1]}");
     f.write("wide.json", "{\"keypoints\": {\"nose\": [1, 2]}, \"width\": 100, \"height\": 900}");
     f.write("mp.json", "{\"pose_landmarks\": [{\"x\": 0, \"y\": 0}]}");
     f.write(

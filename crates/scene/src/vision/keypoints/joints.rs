@@ -155,7 +155,7 @@ pub(super) fn names_of(
         return Ok(given.iter().map(|n| usual(n).into_owned()).collect());
     }
     by_count(count).ok_or_else(|| {
-        let message = format!("{place} has {count} joints, but a list of so many is not known");
+        let message = format!("no known list of joints is as long as {place}, which has {count}");
         let hint = format!(
             "known are {}; name others, {{\"nose\": [x, y, confidence], …}}, or as in COCO's \
              \"categories\"",

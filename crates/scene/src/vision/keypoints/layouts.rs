@@ -50,7 +50,7 @@ impl People {
 fn unknown(root: &Node) -> KeypointsError {
     let layouts = "one person's {\"nose\": [x, y, confidence], …}, people by id {\"ID\": \
                    {\"keypoints\": {…}}, …}, or the output of OpenPose, MMPose, AlphaPose, \
-                   Ultralytics, RTMLib, MediaPipe, COCO or its results";
+                   Ultralytics, RTMLib, MediaPipe, DeepLabCut, SLEAP, COCO or its results";
     root.wrong(layouts).hint(format!("joints without names are known in lists of {}", known()))
 }
 

@@ -203,7 +203,7 @@ fn unknown_lists_of_joints_name_the_known_ones() {
     let message = said(&flat(14));
     assert!(
         message.starts_with(
-            "`[0].keypoints` has 14 joints, but a list of so many is not known; known are \
+            "no known list of joints is as long as `[0].keypoints`, which has 14; known are \
              15 OpenPose MPI, 16 MPII, 17 COCO, "
         ) && message
             .contains("136 Halpe Full-Body; name others, {\"nose\": [x, y, confidence], …}"),
