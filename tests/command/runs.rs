@@ -139,7 +139,10 @@ fn shapes_fields_and_texts_survive() {
 #[test]
 fn counts_are_those_of_the_draws() {
     let f = Folder::new("counts");
-    f.write("slow.pcad", "assume k ~ poisson(3); assume w = map(fn(i) { i }, 0 .. k); observe normal(k, 1) = 3;");
+    f.write(
+        "slow.pcad",
+        "assume k ~ poisson(3); assume w = map(fn(i) { i }, 0 .. k); observe normal(k, 1) = 3;",
+    );
     f.succeeds(&["run", "slow.pcad", "--time", "1s", "--chains", "3", "--quiet", "--out", "out"]);
     let of = |i: usize| {
         let text = f.read(&format!("out/chain-{i}.csv"));

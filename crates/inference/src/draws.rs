@@ -302,9 +302,7 @@ impl Layout {
     /// True if rows of `width` numbers remain unchanged.
     pub fn is_same(&self, width: usize) -> bool {
         let mut all = self.places.iter().enumerate();
-        self.codes.is_empty()
-            && self.places.len() == width
-            && all.all(|(i, from)| *from == Some(i))
+        self.codes.is_empty() && self.places.len() == width && all.all(|(i, from)| *from == Some(i))
     }
 
     /// The row in the new columns, with NaN for numbers that it lacks.

@@ -250,7 +250,9 @@ fn place(v: &Value, column: &Column, dims: &[usize], out: &mut [f64]) -> bool {
         }
         (Value::List(all), [n, inner @ ..]) if all.len() <= *n && !inner.is_empty() => {
             let parts = out.chunks_mut((out.len() / n).max(1));
-            all.iter().zip(parts).fold(true, |fits, (v, part)| place(v, column, inner, part) && fits)
+            all.iter()
+                .zip(parts)
+                .fold(true, |fits, (v, part)| place(v, column, inner, part) && fits)
         }
         _ => {
             let (mut flat, mut known) = (Vec::new(), true);

@@ -137,8 +137,11 @@ fn posterior(
         let whole = if fields > 0 { c.name.rsplit_once('/').map_or("", |p| p.0) } else { &c.name };
         let name = name_of(whole, &mut taken);
         let sizes = c.shape.dims().iter().enumerate();
-        let mut dims: Vec<(String, usize)> =
-            dims.iter().cloned().chain(sizes.map(|(i, n)| (format!("{name}_dim_{i}"), *n))).collect();
+        let mut dims: Vec<(String, usize)> = dims
+            .iter()
+            .cloned()
+            .chain(sizes.map(|(i, n)| (format!("{name}_dim_{i}"), *n)))
+            .collect();
         if fields > 0 {
             let field = |c: &Column| c.name.rsplit('/').next().unwrap_or_default().to_owned();
             let texts = own.iter().map(field).collect();

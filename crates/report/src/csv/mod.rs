@@ -349,7 +349,8 @@ mod tests {
 
     #[test]
     fn counts_are_filled_in_without_moving_anything() {
-        let mut sink = CsvSink::new(Vec::new(), 0, &[("program", "num_samples = 7".into())]).unwrap();
+        let mut sink =
+            CsvSink::new(Vec::new(), 0, &[("program", "num_samples = 7".into())]).unwrap();
         sink.columns(&[]).unwrap();
         let head = sink.comments().to_owned();
         let filled = with_counts(&head, 12, 345);

@@ -10,12 +10,10 @@ use pcadlang_inference::draws::{Column, Shape};
 use std::collections::HashSet;
 
 /// Words that R changes if they are the name of a column.
-const RESERVED: [&str; 11] = [
-    "if", "else", "repeat", "while", "function", "for", "next", "break", "in", "TRUE", "FALSE",
-];
-const ALSO_RESERVED: [&str; 8] = [
-    "NULL", "Inf", "NaN", "NA", "NA_integer_", "NA_real_", "NA_complex_", "NA_character_",
-];
+const RESERVED: [&str; 11] =
+    ["if", "else", "repeat", "while", "function", "for", "next", "break", "in", "TRUE", "FALSE"];
+const ALSO_RESERVED: [&str; 8] =
+    ["NULL", "Inf", "NaN", "NA", "NA_integer_", "NA_real_", "NA_complex_", "NA_character_"];
 
 /// Returns the name of every column of the file, with the elements of arrays one by one.
 ///
