@@ -380,7 +380,7 @@ mod tests {
         let layout = Layout::new(&two, &all);
         assert_eq!([0.0, 1.0].map(|x| layout.apply(&[x])[0]), [2.0, 0.0]);
         assert!(layout.apply(&[f64::NAN])[0].is_nan() && layout.apply(&[7.0])[0].is_nan());
-        // A number is no text.
+        // A number never becomes a text.
         let number = [Column::scalar("kind")];
         assert_eq!(merged(&number, &one), number);
         assert!(Layout::new(&number, &one).apply(&[1.0])[0].is_nan());
