@@ -2,7 +2,6 @@
 
 use super::*;
 use pcadlang_library::Program;
-use pcadlang_library::scene::ViewValue;
 
 /// The view of a program with the shipped body in a pose.
 fn view(scene: &str) -> std::sync::Arc<View> {
