@@ -202,8 +202,8 @@ impl Lens {
     }
 
     /// Where the pinhole sees what the photograph shows at a position: the inverse of
-    /// [`Lens::distorted`], by bisection along the radius, then Newton's method. `None` if there
-    /// is no such position.
+    /// [`Lens::distorted`], by bisection along the radius, then Newton's method. `None` if the
+    /// pinhole sees it nowhere.
     pub fn undistorted(&self, at: [f64; 2]) -> Option<[f64; 2]> {
         let seen = [0, 1].map(|i| (at[i] - self.centre[i]) / self.focal[i]);
         let radius = libm::hypot(seen[0], seen[1]);
