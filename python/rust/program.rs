@@ -133,7 +133,7 @@ impl Program {
                 return Ok(self.changed(self.program.clone().camera(camera)));
             }
         };
-        let file = named.map_err(|f| PyValueError::new_err(f.message))?;
+        let file = named.map_err(|f| plain(f.message))?;
         Ok(self.changed(self.program.clone().camera_file(file)))
     }
 

@@ -104,7 +104,7 @@ fn the_true_place_is_found_through_a_lens() {
         observed(Program::parse(PROGRAM).unwrap().camera_file(file(LENS)), &distorted(&seen));
     let text = "\ninfer { warmup 300 { drift(@x); } repeat 300 { drift(@x); collect x; } }";
     let model = program.edited(&format!("{PROGRAM}{text}")).unwrap().compile().unwrap();
-    let found = model.run(&pcadlang::RunOptions { chains: 1, ..Default::default() }).unwrap();
+    let found = model.run(&pcadlang::RunOptions::default(), 1, 1).unwrap();
     let x = found.quantity("x").unwrap().summary.mean;
     assert!((x - 1.2).abs() < 0.02, "{x}");
 }
@@ -142,7 +142,7 @@ fn the_lens_of_a_photograph_moves_the_default_view() {
         let mut trace = model.simulate(1, 0).unwrap();
         let samples = model.code().samples.clone();
         let values = trace.query(&samples, Default::default()).unwrap();
-        values.iter().map(|v| v.numbers().unwrap_or_default()).collect::<Vec<_>>().concat()
+        values.iter().flat_map(|v| v.numbers()).collect::<Vec<f64>>()
     };
     // 27 mm of a diagonal of 43.27: 0.78 of the longer side, so 4.4 units fill it from 3.43.
     let stated = of(&with_exif(80, 60));
@@ -152,16 +152,8 @@ fn the_lens_of_a_photograph_moves_the_default_view() {
         "{stated:?}"
     );
     assert_eq!(stated[4], 0.05);
-    // A crop, and a picture without: as before, to the last bit.
-    for plain in [
-        with_exif(80, 70),
-        with_exif(80, 60)[..2].iter().chain(&with_exif(80, 60)[48..]).copied().collect(),
-    ] {
-        if photo::decode(&plain, &Default::default()).is_ok() {
-            let plain = of(&plain);
-            assert_eq!(plain[..], [0.0, 0.0, 8.0, 1.818, 0.4], "{plain:?}");
-        }
-    }
+    // A crop: as before, to the last bit.
+    assert_eq!(of(&with_exif(80, 70)), [0.0, 0.0, 8.0, 1.818, 0.4]);
     let Camera { projection: Projection::Pinhole { focal_px, .. }, .. } =
         Camera::default_by(80, 60, focal)
     else {
@@ -187,7 +179,7 @@ fn a_program_may_name_a_camera_itself() {
     let model = Program::open(folder.join("p.pcad").to_str().unwrap()).unwrap().compile().unwrap();
     let value = model.code().globals.get("eye").cloned().unwrap();
     let eye = model.simulate(1, 0).unwrap().query(&[value], Default::default()).unwrap();
-    let CameraValue(camera, ..) = eye[0].downcast::<CameraValue>().unwrap();
+    let camera = eye[0].downcast::<CameraValue>().unwrap().0;
     assert_eq!((camera.eye, camera.forward), (glam::DVec3::ZERO, glam::DVec3::NEG_Z));
     std::fs::remove_dir_all(&folder).unwrap();
 }

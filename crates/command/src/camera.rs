@@ -21,7 +21,7 @@ pub struct CameraOf {
     /// NeRF's transforms.json, BOP, Open3D, RealSense, Kinect, glTF, or this program's, or a
     /// photograph with Exif; `#PICTURE` selects one of several, options follow:
     /// 'cameras.txt#a.jpg, up = "z", unit = 0.001, at = "view"'
-    #[arg(value_name = "FILE[#PICTURE][,OPTION=VALUE…]")]
+    #[arg(value_name = "FILE[#PICTURE]")]
     pub file: PathBuf,
     /// The picture, of a file with several: its name, the end of its path, or its number
     #[arg(long, value_name = "NAME")]
@@ -78,8 +78,7 @@ fn say(file: &CameraFile, Seen { camera, lens }: &Seen) {
     line("principal", format!("({x}, {y}) pixels; the first pixel's centre is (0.5, 0.5)"));
     let coefficients = lens.as_ref().map_or_else(Vec::new, |lens| {
         let d = lens.distortion();
-        let all =
-            [("k", &d.radial[..]), ("divisor ", &d.divisor), ("p", &d.tangential), ("s", &d.prism)];
+        let all = [("k", &d.radial[..]), ("d", &d.divisor), ("p", &d.tangential), ("s", &d.prism)];
         let name = |(name, c): (&'static str, &[f64])| {
             let some = c.iter().enumerate().filter(|(_, x)| **x != 0.0);
             some.map(|(i, x)| format!("{name}{} {x}", i + 1)).collect::<Vec<_>>()

@@ -26,7 +26,7 @@ pub struct Inputs {
     pub sets: Vec<(String, String)>,
     /// The camera: a file of OpenCV, COLMAP, NeRF, BOP, Open3D and others, see `pcadlang camera`
     /// [default: 4.4 units across, at distance 8 or by the lens that the photograph states]
-    #[arg(long, value_name = "FILE[#PICTURE][,OPTION=VALUE…]")]
+    #[arg(long, value_name = "FILE[#PICTURE]")]
     pub camera: Option<PathBuf>,
     /// A contour detector to replace colour gradients, in builds with the feature
     /// contour_detectors: a structured forest (model.yml.gz) or a network (.onnx). Options

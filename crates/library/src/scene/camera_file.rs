@@ -200,7 +200,7 @@ impl NamedCamera {
 /// Parses options such as `colours = "bgr", white = 255` as the arguments of a kind of data.
 ///
 /// # Errors
-/// A text that is no list of such options.
+/// A text that is not a list of such options.
 pub fn kind_options(kind: &str, text: &str) -> Result<Options, Fault> {
     if text.trim().is_empty() {
         return Ok(Options::default());

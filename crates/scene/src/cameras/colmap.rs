@@ -21,7 +21,7 @@ pub(super) struct Kind {
 
 /// The models, in the order of their numbers, with the number of their parameters; `None` for
 /// those that are not supported.
-const MODELS: [(&str, usize, Option<fn(&[f64]) -> Numbers>); 18] = [
+const MODELS: [(&str, usize, Option<Read>); 18] = [
     ("SIMPLE_PINHOLE", 3, Some(|p| simple(p, &[]))),
     ("PINHOLE", 4, Some(|p| full(p, &[]))),
     ("SIMPLE_RADIAL", 4, Some(|p| simple(p, &p[3..]))),
@@ -41,6 +41,9 @@ const MODELS: [(&str, usize, Option<fn(&[f64]) -> Numbers>); 18] = [
     ("EUCM", 6, None),
     ("EQUIRECTANGULAR", 2, None),
 ];
+
+/// Reads the parameters of a model.
+type Read = fn(&[f64]) -> Numbers;
 
 /// Focal lengths, principal point and distortion.
 type Numbers = ([f64; 2], [f64; 2], Distortion);
@@ -151,7 +154,7 @@ pub(super) fn read(
     file.picture = Some(name.clone());
     let [w, x, y, z] = taken.rotation;
     let q = DQuat::from_xyzw(x, y, z, w);
-    if !(q.length() > 1e-9) {
+    if q.length().is_nan() || q.length() <= 1e-9 {
         return Err(CameraError::other(format!("picture `{name}` has no rotation")));
     }
     let rotation = DMat3::from_quat(q.normalize());

@@ -114,7 +114,7 @@ pub(super) fn numbers(value: &Value) -> Option<Vec<f64>> {
     }
 }
 
-/// As [`numbers`], of so many.
+/// As [`numbers`], exactly `N`.
 pub(super) fn array<const N: usize>(value: &Value) -> Option<[f64; N]> {
     numbers(value)?.try_into().ok()
 }

@@ -274,12 +274,12 @@ fn by_content(
             return Ok(file);
         }
     }
-    let camera = own::read(map).map_err(|e| match e {
-        CameraError::Missing("model") => {
-            CameraError::other(format!("the camera file has no `model`; known are {KNOWN}"))
-        }
-        other => other,
-    })?;
+    if !map.contains_key("model") {
+        return Err(CameraError::other(format!(
+            "the camera file has no `model`, and is not of another known kind: {KNOWN}"
+        )));
+    }
+    let camera = own::read(map)?;
     let model = match camera.projection {
         Projection::Pinhole { .. } => "pinhole",
         Projection::Orthographic { .. } => "orthographic",
@@ -355,7 +355,7 @@ fn selected<'a, T>(
         (None, None, [one]) => Ok(one),
         (None, None, []) => Err(CameraError::other(format!("the file has no {what}"))),
         (None, None, _) => Err(CameraError::other(format!(
-            "the file has {} of a {what}; say which: FILE#NAME, one of {}",
+            "the file has {} {what}s; say which: FILE#NAME, one of {}",
             all.len(),
             listed()
         ))),

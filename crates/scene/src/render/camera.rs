@@ -19,7 +19,7 @@ pub enum CameraError {
     #[error("a camera file holds one JSON object")]
     NotAnObject,
     /// A key that is not one of this program's cameras.
-    #[error("the camera file has an unknown key `{key}`{}; `note` and `name` are for remarks", near(.nearest))]
+    #[error("the camera file has an unknown key `{key}`; {}", near(.nearest))]
     Unknown {
         /// The key.
         key: String,
@@ -50,7 +50,10 @@ impl CameraError {
 }
 
 fn near(key: &Option<&str>) -> String {
-    key.map_or_else(String::new, |k| format!("; did you mean `{k}`?"))
+    match key {
+        Some(key) => format!("did you mean `{key}`?"),
+        None => "`note` and `name` are for remarks".to_owned(),
+    }
 }
 
 /// How camera coordinates become pixels.

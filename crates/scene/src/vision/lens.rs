@@ -63,8 +63,7 @@ impl Distortion {
         for i in 1..=4096 {
             let r = f64::from(i) * STEP;
             let now = r * self.factor(r * r);
-            // False for NaN, too.
-            if !(now > before) {
+            if now.is_nan() || now <= before {
                 return r - STEP;
             }
             before = now;
@@ -185,7 +184,8 @@ impl Lens {
     pub fn distorted(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         let Pinhole { focal_px, centre, .. } = self.pinhole;
         let [x, y] = [(x - centre[0]) / focal_px, (y - centre[1]) / focal_px];
-        if !(libm::hypot(x, y) <= self.limit) {
+        let radius = libm::hypot(x, y);
+        if radius.is_nan() || radius > self.limit {
             return None;
         }
         let seen = self.distortion.apply([x, y]);
@@ -202,8 +202,8 @@ impl Lens {
     }
 
     /// Where the pinhole sees what the photograph shows at a position: the inverse of
-    /// [`Lens::distorted`], by bisection along the radius, then Newton's method. `None` if there
-    /// is no such position.
+    /// [`Lens::distorted`], by bisection along the radius, then Newton's method. `None` if the
+    /// pinhole sees it nowhere.
     pub fn undistorted(&self, at: [f64; 2]) -> Option<[f64; 2]> {
         let seen = [0, 1].map(|i| (at[i] - self.centre[i]) / self.focal[i]);
         let radius = libm::hypot(seen[0], seen[1]);

@@ -33,7 +33,7 @@ pub fn cameras(bytes: &[u8]) -> Result<Vec<GltfCamera>, GeomError> {
         })?;
         let perspective = camera.perspective.as_ref().map(|p| (p.yfov, p.aspect_ratio));
         if let Some((yfov, aspect)) = perspective
-            && !(yfov > 0.0 && yfov < 3.14 && aspect.is_none_or(|a| a > 1e-3 && a < 1e3))
+            && !(yfov > 0.0 && yfov < 3.1 && aspect.is_none_or(|a| a > 1e-3 && a < 1e3))
         {
             return Err(GeomError::invalid(format!(
                 "camera `{name}` must have a yfov between 0 and pi, and a positive aspectRatio"

@@ -77,7 +77,7 @@ fn or_by_the_pixels_of_the_sensor() {
     for size in [(6000, 4000), (600, 400)] {
         assert!((focal(&chunk(1, &fields), size).unwrap() - 50.0 / 36.0).abs() < 1e-6);
     }
-    // Without the size that the resolution is of, it says nothing.
+    // Without the size that the resolution is of, it is ignored.
     assert_eq!(focal(&chunk(1, &fields[..3]), (600, 400)), None);
 }
 
