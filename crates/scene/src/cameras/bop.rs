@@ -1,4 +1,4 @@
-//! BOP's `scene_camera.json` (bop_toolkit, `docs/bop_datasets_format.md`): for each picture a
+//! BOP's `scene_camera.json` (bop_toolkit, `bop_datasets_format.md`): for each picture a
 //! matrix and, in some data sets, the camera's place in the world, in millimetres.
 //!
 //! The toolkit itself has the centre of the first pixel at 0 in `misc.depth_im_to_dist_im` and at
