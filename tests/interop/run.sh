@@ -34,11 +34,12 @@ environment() {
   fi
 }
 
-# R with the packages; installed where that is allowed, which takes a minute or two.
+# R with the packages; CI installs them, which takes a minute or two.
 r_packages() {
   local all='for (p in c("rstan", "posterior", "coda", "loo", "jsonlite")) if (!requireNamespace(p, quietly = TRUE)) quit(status = 1)'
   Rscript -e "$all" >/dev/null 2>&1 && return
-  if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+  if [ -n "${CI:-}" ] && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+    timeout 60 apt-get update -qq >/dev/null 2>&1 || true
     timeout 240 apt-get install -y -qq --no-install-recommends r-base-core r-cran-{rstan,posterior,coda,loo,jsonlite} >/dev/null 2>&1 || true
   fi
   Rscript -e "$all" >/dev/null 2>&1

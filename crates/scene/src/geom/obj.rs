@@ -359,6 +359,31 @@ mod tests {
         );
     }
 
+    /// `tobj` reads the same triangles, in the same order.
+    #[test]
+    fn another_reader_agrees() {
+        let text = "mtllib a.mtl\no one\nv 0 0 0\nv 1.5 0 0\nv 1.5e0 1 0\nv 0 1 -2\nvt 0 0\nvn 0 0 1\n\
+                    usemtl red\ns 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\nl 1 2\ng two\nv 3 3 3 1 0 0\nf -1 -3 -2\n\
+                    f 1//1 3//1 5//1\n";
+        let options =
+            tobj::LoadOptions { triangulate: true, ignore_lines: true, ..Default::default() };
+        let none = |_: &std::path::Path| Ok(Default::default());
+        let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, none).unwrap();
+        let theirs: Vec<Vec3> = models
+            .iter()
+            .flat_map(|m| {
+                m.mesh
+                    .indices
+                    .iter()
+                    .map(|i| Vec3::from_slice(&m.mesh.positions[3 * *i as usize..]))
+            })
+            .collect();
+        let ours = indexed(text.as_bytes()).unwrap();
+        let corner = |v: &u32| ours.positions[*v as usize];
+        assert_eq!(ours.triangles.iter().flatten().map(corner).collect::<Vec<_>>(), theirs);
+        assert_eq!(theirs.len(), 12);
+    }
+
     #[test]
     fn parts_and_shape_survive() {
         let stack = [
