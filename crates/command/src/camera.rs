@@ -223,12 +223,15 @@ mod tests {
         let camera = Camera::default_for(200, 200);
         let seen = Seen { camera, lens: None };
         let picture = axes(&seen, None, anchor(&camera)).unwrap();
-        // 4.4 units across 200 pixels; axes of 0.5 units are 22.7 pixels.
-        let is = |x: u32, y: u32, c: usize| {
+        // 4.4 units across the picture; axes of 0.5 units are 0.114 of it.
+        let side = picture.width();
+        let is = |x: f64, y: f64, c: usize| {
+            let [x, y] = [x, y].map(|f| (f * f64::from(side)) as u32);
             let p = picture.get_pixel(x, y).0;
             (0..3).all(|o| o == c || p[c] > p[o].saturating_add(40))
         };
-        assert!(is(110, 100, 0) && is(100, 90, 1), "{:?}", picture.get_pixel(110, 100));
+        assert!(is(0.55, 0.5, 0) && is(0.61, 0.5, 0) && is(0.5, 0.45, 1));
+        assert!(!is(0.63, 0.5, 0) && !is(0.5, 0.37, 1));
         assert_eq!(picture.get_pixel(50, 20).0, [48; 3]);
         let behind = Camera { forward: DVec3::Z, right: -DVec3::X, ..camera };
         assert_eq!(anchor(&behind), DVec3::new(0.0, 0.0, 16.0));
