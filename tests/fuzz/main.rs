@@ -277,10 +277,9 @@ fn people() -> Vec<Vec<u8>> {
              \"hand_left_keypoints_2d\": [{hand}]}}]}}"
         ),
         format!("{{\"a/000001.jpg\": {{\"bodies\": [{{\"joints\": [{coco}]}}]}}}}"),
-        format!(
-            "{{\"meta_info\": {{\"keypoint_id2name\": {{\"0\": \"nose\"}}}}, \"instance_info\": \
-             [{{\"frame_id\": 1, \"instances\": [{{\"keypoints\": [[1, 2]], \"keypoint_scores\": [1.2]}}]}}]}}"
-        ),
+        r#"{"meta_info": {"keypoint_id2name": {"0": "nose"}}, "instance_info":
+            [{"frame_id": 1, "instances": [{"keypoints": [[1, 2]], "keypoint_scores": [1.2]}]}]}"#
+            .to_owned(),
         format!("[{{\"keypoints\": {{\"x\": [{columns}], \"y\": [{columns}]}}, \"track_id\": 3}}]"),
         format!(
             "{{\"keypoints\": [[{positions}], [{positions}]], \"scores\": [[{columns}], [{columns}]]}}"

@@ -453,7 +453,7 @@ fn what_is_no_camera() {
         "{}",
         refusal(&deep)
     );
-    assert!(refusal(&"a:\n - b:\n".repeat(1)).contains("no `model`"));
+    assert!(refusal("a:\n - b:\n").contains("no `model`"));
     assert!(read_at("x", &[0xff, 0xfe, 0, 1], &Asked::default()).is_err());
     let own = r#"{"model": "pinhole", "position": [0, 0, 8], "looks_along": [0, 0, -1], "up": [0, 1, 0],
         "image": [64, 48], "focal_px": 100}"#;

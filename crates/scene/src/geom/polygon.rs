@@ -88,8 +88,8 @@ fn use_all(triangles: &mut Vec<[u32; 3]>, corners: usize) {
         };
         let apex = triangles[i][(k + 2) % 3];
         let step = |s: u32| [(a + s) % n, (a + s + 1) % n, apex];
-        triangles[i] = step(0);
-        triangles.extend((1..skipped).map(step));
+        triangles.swap_remove(i);
+        triangles.extend((0..skipped).map(step));
     }
 }
 
