@@ -123,7 +123,7 @@ fn posterior(
     rows: &[&DrawRow],
     dims: &[(String, usize)],
 ) -> (Vec<Array>, Vec<Array>) {
-    let (mut taken, mut arrays, mut names) = (HashSet::new(), Vec::new(), Vec::new());
+    let (mut taken, mut arrays, mut names) = (reserved(columns), Vec::new(), Vec::new());
     let (mut begin, mut rest) = (0, columns);
     while let Some(c) = rest.first() {
         let fields = record_at(columns, rest);
@@ -200,8 +200,31 @@ fn sample_stats(rows: &[&DrawRow], dims: &[(String, usize)]) -> Vec<Array> {
     ]
 }
 
+/// The names of coordinates, in lower case, which a quantity of the same name would replace.
+fn reserved(columns: &[Column]) -> HashSet<String> {
+    let of = |c: &Column| {
+        let whole = plain(&c.name).to_lowercase();
+        let record = whole.rsplit_once('.').filter(|_| c.is_field).map(|(record, _)| record);
+        let owners: Vec<String> =
+            std::iter::once(&*whole).chain(record).map(str::to_owned).collect();
+        let dims = c.shape.dims().len();
+        let ends = (0..dims).map(|i| format!("_dim_{i}")).chain(["_field".into(), "_level".into()]);
+        ends.flat_map(|end| owners.iter().map(|o| o.clone() + &end).collect::<Vec<_>>())
+            .collect::<Vec<String>>()
+    };
+    let dims = ["chain", "draw"].map(str::to_owned);
+    columns.iter().flat_map(of).chain(dims).collect()
+}
+
 /// Converts a name to one that is valid for a folder and differs from all names taken.
 fn name_of(name: &str, taken: &mut HashSet<String>) -> String {
+    let plain = plain(name);
+    let mut all = std::iter::once(plain.clone()).chain((2..).map(|i| format!("{plain}_{i}")));
+    all.find(|name| taken.insert(name.to_lowercase())).unwrap_or(plain)
+}
+
+/// Converts a name to one that is valid for a folder.
+fn plain(name: &str) -> String {
     let fits = |c: char| c.is_alphanumeric() || "_.-+[]()".contains(c);
     let plain: String = name
         .chars()
@@ -215,8 +238,5 @@ fn name_of(name: &str, taken: &mut HashSet<String>) -> String {
             }
         })
         .collect();
-    let plain =
-        if plain.is_empty() || plain.starts_with('.') { format!("_{plain}") } else { plain };
-    let mut all = std::iter::once(plain.clone()).chain((2..).map(|i| format!("{plain}_{i}")));
-    all.find(|name| taken.insert(name.to_lowercase())).unwrap_or(plain)
+    if plain.is_empty() || plain.starts_with('.') { format!("_{plain}") } else { plain }
 }

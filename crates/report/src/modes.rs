@@ -80,10 +80,14 @@ pub fn modes(quantities: &[Quantity], evidence: Option<&Evidence>) -> Vec<Mode> 
 }
 
 /// Returns the quantities on which chains may disagree, the worst first. Those that never
-/// moved in any chain have no R-hat, but may differ between chains.
+/// moved in any chain have no R-hat, but may differ between chains. One that is missing from some
+/// draws, or infinite in some, has none either, and says nothing.
 fn apart(quantities: &[Quantity]) -> Vec<&Quantity> {
-    let rank =
-        |q: &Quantity| if q.summary.r_hat.is_nan() { f64::INFINITY } else { q.summary.r_hat };
+    let rank = |q: &Quantity| match q.summary.r_hat {
+        r if !r.is_nan() => r,
+        _ if q.is_stuck() => f64::INFINITY,
+        _ => f64::NEG_INFINITY,
+    };
     let disagree = |q: &&Quantity| rank(q) > DISAGREE && !q.is_constant();
     let mut worst: Vec<&Quantity> = quantities.iter().filter(disagree).collect();
     worst.sort_by(|a, b| rank(b).total_cmp(&rank(a)));
@@ -205,6 +209,18 @@ mod tests {
         let chains: Vec<Vec<f64>> =
             centres.iter().zip(0..).map(|(c, s)| noise(13 + 977 * s, *c)).collect();
         Quantity::new(name, None, chains)
+    }
+
+    /// What is missing from some draws, or infinite in some, has no R-hat: no sign of modes.
+    #[test]
+    fn missing_draws_make_no_modes() {
+        for odd in [f64::NAN, f64::INFINITY] {
+            let mut chains: Vec<Vec<f64>> = (0..4).map(|s| noise(13 + 977 * s, 0.0)).collect();
+            chains.iter_mut().enumerate().for_each(|(i, c)| c[7 * i] = odd);
+            let all = [quantity("log_joint", [0.0; 4]), Quantity::new("q", None, chains)];
+            assert!(all[1].summary.r_hat.is_nan());
+            assert_eq!(modes(&all, None), []);
+        }
     }
 
     #[test]

@@ -58,14 +58,7 @@ impl Object for CameraFileValue {
     }
 
     fn remark(&self) -> Option<String> {
-        let mut all = self.0.remarks.clone();
-        if self.0.seen(None).is_ok_and(|s| s.lens.is_some()) {
-            all.push(
-                "its lens distorts, and photographs are not undistorted by it: use --camera"
-                    .to_owned(),
-            );
-        }
-        (!all.is_empty()).then(|| all.join("; "))
+        (!self.0.remarks.is_empty()).then(|| self.0.remarks.join("; "))
     }
 }
 
@@ -82,8 +75,14 @@ impl DataFormat for Format {
     ) -> Result<Value, Fault> {
         let (path, picture) = parts(file);
         let read = CameraFile::read(path, bytes, &asked(picture, None, options)?, beside);
-        read.map(|c| Value::object(CameraFileValue(c)))
-            .map_err(|e| unreadable(path, &e.to_string()))
+        let camera = read.map_err(|e| unreadable(path, &e.to_string()))?;
+        if camera.seen(None).is_ok_and(|s| s.lens.is_some()) {
+            let why =
+                "its lens distorts, or its fx and fy differ, and only a run's camera undistorts";
+            let fault = unreadable(path, why);
+            return Err(fault.with_hint(format!("give it to the run: --camera {path}")));
+        }
+        Ok(Value::object(CameraFileValue(camera)))
     }
 
     fn path_of<'a>(&self, path: &'a str) -> &'a str {

@@ -202,12 +202,12 @@ fn counted(key: &str, n: u64) -> String {
 
 /// Returns the comments at the head of a file with the number of steps of the warm-up and of
 /// draws; the length stays the same. Comments of older versions, without counts, stay as they
-/// are.
+/// are. Without a warm-up the number is 1, for the start: CmdStanPy refuses 0.
 pub(crate) fn with_counts(head: &str, warmup: u64, draws: u64) -> String {
     let line = |line: &str| {
         let key = line.strip_prefix("# ").and_then(|l| l.split_once(" = ")).map(|(key, _)| key);
         match COUNTS.iter().position(|count| Some(*count) == key) {
-            Some(i) => counted(COUNTS[i], [warmup, draws][i]),
+            Some(i) => counted(COUNTS[i], [warmup.max(1), draws][i]),
             None => format!("{line}\n"),
         }
     };

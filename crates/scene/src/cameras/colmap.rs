@@ -138,8 +138,9 @@ pub(super) fn read(
     let format = if kind.binary { "COLMAP (binary)" } else { "COLMAP (text)" };
     let Some(taken) = taken else {
         let all: Vec<_> = lenses.iter().map(|c| (c.id.to_string(), c)).collect();
-        let (_, camera) = selected(&all, asked, "camera")?;
+        let (number, camera) = selected(&all, asked, "camera")?;
         let mut file = lens(format, camera)?;
+        file.picture = asked.picture.map(|_| number.clone());
         file.remarks.push(format!("there is no {other} beside it, so no position"));
         return Ok(file);
     };

@@ -11,7 +11,7 @@ use super::pose::Pose;
 use super::{Asked, CameraFile, Intrinsics, selected};
 use crate::render::CameraError;
 use crate::vision::Distortion;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DMat4, DVec3};
 use serde_json::{Map, Value};
 
 /// What to do about a lens that is not of these models.
@@ -25,8 +25,18 @@ pub(super) const HALF: f64 = 0.5;
 
 /// Reads a file, or the part of it that was asked for.
 pub(super) fn read(map: &Object, asked: &Asked) -> Result<Option<CameraFile>, CameraError> {
+    if get(map, &["m2"]).is_some() {
+        return stereo(map, asked).map(Some);
+    }
     if let Some(file) = one(map)? {
         return Ok(Some(file));
+    }
+    // One that was asked for by its name stands for itself, whatever the others are.
+    if let Some(name) = asked.picture
+        && let Some(part) = map.get(name).and_then(Value::as_object)
+    {
+        let named = |file| CameraFile { picture: Some(name.to_owned()), ..file };
+        return Ok(one(part)?.map(named));
     }
     let mut parts = Vec::new();
     for (name, part) in map {
@@ -43,6 +53,31 @@ pub(super) fn read(map: &Object, asked: &Asked) -> Result<Option<CameraFile>, Ca
     Ok(Some(CameraFile { picture: Some(name.clone()), ..file.clone() }))
 }
 
+/// Reads one of OpenCV's two calibrated cameras, `M1` or `M2`. The pose between them is not one in
+/// a world.
+fn stereo(map: &Object, asked: &Asked) -> Result<CameraFile, CameraError> {
+    let mut parts = Vec::new();
+    for n in ["1", "2"] {
+        let mut part = Object::new();
+        for (key, value) in map {
+            let own = bare(key);
+            match own.strip_suffix(n) {
+                Some("m") => part.insert("cameramatrix".into(), value.clone()),
+                Some("d") => part.insert("dist".into(), value.clone()),
+                _ if own.contains("size") || own.contains("width") || own.contains("height") => {
+                    part.insert(key.clone(), value.clone())
+                }
+                _ => None,
+            };
+        }
+        if let Some(file) = one(&part)? {
+            parts.push((format!("M{n}"), file));
+        }
+    }
+    let (name, file) = selected(&parts, asked, "camera")?;
+    Ok(CameraFile { picture: Some(name.clone()), ..file.clone() })
+}
+
 const MATRIX: [&str; 7] =
     ["cameramatrix", "k", "mtx", "intrinsicmatrix", "intrinsics", "intrinsic", "m1"];
 const DISTORTION: [&str; 10] = [
@@ -57,11 +92,26 @@ const DISTORTION: [&str; 10] = [
     "distortion",
     "distcoefs",
 ];
-const FISHEYES: [&str; 6] = ["fisheye", "equidistant", "kannala", "ftheta", "equirect", "omni"];
+const FISHEYES: [&str; 8] =
+    ["fisheye", "equidistant", "kannala", "ftheta", "equirect", "omni", "eucm", "doublesphere"];
+/// librealsense's `rs2_distortion`, by number.
+const REALSENSE: [&str; 6] = [
+    "none",
+    "modified_brown_conrady",
+    "inverse_brown_conrady",
+    "ftheta",
+    "brown_conrady",
+    "kannala_brandt4",
+];
+/// Models of `distortion_model` that are read.
+const MODELS: [&str; 8] =
+    ["none", "pinhole", "plumbbob", "rational", "radtan", "brown", "opencv", "perspective"];
 
 /// Reads one camera; `None` if the object has no focal length.
 fn one(map: &Object) -> Result<Option<CameraFile>, CameraError> {
     let at = |keys: &[&str]| get(map, keys).and_then(number);
+    let mut model = model(map)?;
+    region(map)?;
     let own = |fx: Option<f64>, fy: Option<f64>| {
         let f = fx.or(fy)?;
         Some((fx.unwrap_or(f), fy.unwrap_or(f)))
@@ -101,15 +151,6 @@ fn one(map: &Object) -> Result<Option<CameraFile>, CameraError> {
         let both = get(map, &["imagesize", "resolution", "size", "imgsize"])?;
         array::<2>(both).and_then(|[w, h]| size(w, h))
     };
-    let mut model = get(map, &["distortionmodel", "model", "cameramodel"])
-        .map_or_else(String::new, |v| v.as_str().map_or_else(|| v.to_string(), str::to_owned));
-    let fisheye = get(map, &["fisheyemodel", "fisheye"])
-        .is_some_and(|v| v.as_bool().unwrap_or(number(v) != Some(0.0)));
-    if fisheye || FISHEYES.iter().any(|f| bare(&model).contains(f)) {
-        return Err(CameraError::other(format!(
-            "the lens is a fisheye ({model}), which is not supported: {UNDISTORT}"
-        )));
-    }
     let modified = ["modified", "inverse"].iter().any(|m| bare(&model).contains(m));
     let distortion = Distortion { modified, ..distortion(map)? };
     if model.is_empty() {
@@ -123,10 +164,73 @@ fn one(map: &Object) -> Result<Option<CameraFile>, CameraError> {
     };
     let mut file = CameraFile::new(format, model, intrinsics);
     file.pose = pose(map)?;
+    if file.pose.is_none() && get(map, &["rvecs", "tvecs", "extrinsicparameters"]).is_some() {
+        file.remarks.push("positions of several views (rvecs, tvecs) are not read".into());
+    }
     if let Some(scale) = at(&["depthscale"]).filter(|s| *s > 0.0) {
         file.remarks.push(depth_scale(scale));
     }
     Ok(Some(file))
+}
+
+/// The name of the lens model; empty if the file states none.
+fn model(map: &Object) -> Result<String, CameraError> {
+    let refused = |what: String| {
+        Err(CameraError::other(format!("the lens is {what}, which is not supported: {UNDISTORT}")))
+    };
+    let named = |key: &str| {
+        let value = get(map, &[key])?;
+        let by_number = value.as_u64().and_then(|n| REALSENSE.get(usize::try_from(n).ok()?));
+        Some(match (by_number, value) {
+            (Some(name), _) => (*name).to_owned(),
+            (None, Value::String(name)) => name.clone(),
+            (None, other) => other.to_string(),
+        })
+    };
+    let names: Vec<String> =
+        ["distortionmodel", "model", "cameramodel"].into_iter().filter_map(named).collect();
+    let fisheye = |name: &&String| {
+        let name = bare(name);
+        name == "ds" || FISHEYES.iter().any(|f| name.contains(f))
+    };
+    if let Some(name) = names.iter().find(fisheye) {
+        return refused(format!("a fisheye ({name})"));
+    }
+    let flagged = get(map, &["fisheyemodel", "fisheye"])
+        .is_some_and(|v| v.as_bool().unwrap_or(number(v) != Some(0.0)));
+    if flagged {
+        return refused("a fisheye".to_owned());
+    }
+    if get(map, &["xi"]).is_some() {
+        return refused("omnidirectional (it has `xi`)".to_owned());
+    }
+    if let Some(name) = named("distortionmodel").filter(|n| !n.is_empty())
+        && !MODELS.iter().any(|known| bare(&name).contains(known))
+    {
+        return refused(format!("of a model that is not known (`{name}`)"));
+    }
+    Ok(names.into_iter().next().unwrap_or_default())
+}
+
+/// Refuses ROS's pictures of a part of the sensor, whose pixels are not those of the matrix.
+fn region(map: &Object) -> Result<(), CameraError> {
+    let of = |map: &Object, key: &str| get(map, &[key]).and_then(number).unwrap_or(0.0);
+    let roi = get(map, &["roi"]).and_then(Value::as_object);
+    let part = roi.is_some_and(|roi| {
+        let whole = |own: &str, side: &str| {
+            [0.0, of(map, side)].contains(&of(roi, own)) && of(map, side) >= 0.0
+        };
+        of(roi, "xoffset") != 0.0
+            || of(roi, "yoffset") != 0.0
+            || !whole("width", "width") && !whole("width", "imagewidth")
+            || !whole("height", "height") && !whole("height", "imageheight")
+    });
+    if part || of(map, "binningx") > 1.0 || of(map, "binningy") > 1.0 {
+        return Err(CameraError::other(
+            "the picture is of a region of interest, or binned; give the matrix of its own pixels",
+        ));
+    }
+    Ok(())
 }
 
 /// What a depth scale of BOP means for a depth map.
@@ -172,6 +276,9 @@ fn by_name(map: &Object) -> Result<Vec<f64>, CameraError> {
     if c("codx") != 0.0 || c("cody") != 0.0 {
         return Err(CameraError::other("a centre of distortion (codx, cody) is not supported"));
     }
+    if c("skew") != 0.0 {
+        return Err(CameraError::other("a skew is not supported, only pixels with right angles"));
+    }
     Ok(["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].map(c).to_vec())
 }
 
@@ -198,11 +305,33 @@ pub(super) fn of_opencv(all: &[f64]) -> Result<Distortion, CameraError> {
     })
 }
 
-/// The world's map to the camera: a rotation, as a matrix or OpenCV's vector, and a translation.
+/// Keys of the world's map to the camera, 3 x 4 or 4 x 4, and of its inverse.
+const FROM_WORLD: [&str; 6] =
+    ["extrinsic", "extrinsics", "extrinsicmatrix", "rt", "w2c", "worldtocamera"];
+const TO_WORLD: [&str; 4] = ["c2w", "cam2world", "camtoworld", "cameratoworld"];
+
+/// The world's map to the camera: a rotation, as a matrix or OpenCV's vector, and a translation; or
+/// both as a matrix.
 fn pose(map: &Object) -> Result<Option<Pose>, CameraError> {
     // ROS: R rectifies, P projects afterwards.
     if map.contains_key("P") || get(map, &["projectionmatrix"]).is_some() {
         return Ok(None);
+    }
+    let whole = |keys: &[&str]| {
+        let rows = get(map, keys).and_then(numbers)?;
+        let last = [0.0, 0.0, 0.0, 1.0];
+        let rows: [f64; 16] = match rows.len() {
+            12 => [&rows[..], &last].concat().try_into().ok()?,
+            _ => rows.try_into().ok()?,
+        };
+        Some(DMat4::from_cols_array(&rows).transpose())
+    };
+    let rigid = |m: DMat4| Pose::from_world(DMat3::from_mat4(m), m.w_axis.truncate()).map(Some);
+    if let Some(m) = whole(&FROM_WORLD) {
+        return rigid(m);
+    }
+    if let Some(m) = whole(&TO_WORLD).filter(|m| m.determinant() != 0.0) {
+        return rigid(m.inverse());
     }
     let rotation = get(map, &["rvec", "rotationvector", "r", "rotation", "rotationmatrix"]);
     let translation = get(map, &["tvec", "translationvector", "t", "translation"]);

@@ -112,6 +112,11 @@ impl CameraFile {
         beside: &Beside,
     ) -> Result<CameraFile, CameraError> {
         let mut file = by_content(name, bytes, asked, beside)?;
+        if let (Some(picture), None) = (asked.picture, &file.picture) {
+            return Err(CameraError::other(format!(
+                "the file has one camera, without a name, and none called `{picture}`"
+            )));
+        }
         file.at = asked.at;
         if asked.world != FileFrame::default() {
             match (&mut file.intrinsics, &mut file.pose) {

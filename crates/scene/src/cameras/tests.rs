@@ -42,6 +42,56 @@ fn sees(file: &CameraFile, expected: &[[f64; 2]], half: f64) {
     }
 }
 
+#[test]
+fn lenses_of_other_models_are_refused() {
+    let k = r#""camera_matrix": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "width": 640, "height": 480"#;
+    for (more, says) in [
+        (r#""xi": 1.2, "distortion_coefficients": [0.1, 0, 0, 0]"#, "omnidirectional"),
+        (r#""distortion_model": "whatever", "D": [0, 0, 0, 0, 0, 0, 0, 0]"#, "`whatever`"),
+        (r#""model": 3, "coeffs": [0.1, 0, 0, 0, 0]"#, "a fisheye (ftheta)"),
+        (r#""camera_model": "ds""#, "a fisheye (ds)"),
+        (r#""skew": 3"#, "skew"),
+        (
+            r#""roi": {"x_offset": 100, "y_offset": 0, "width": 400, "height": 300}"#,
+            "region of interest",
+        ),
+        (r#""binning_x": 2"#, "binned"),
+    ] {
+        let said = refusal(&format!("{{{k}, {more}}}"));
+        assert!(said.contains(says), "{more}: {said}");
+    }
+    let roi = r#""roi": {"x_offset": 0, "y_offset": 0, "width": 640, "height": 480, "do_rectify": false}"#;
+    assert!(!read(&format!("{{{k}, {roi}}}")).has_position());
+    assert!(
+        read_at("camera", format!("{{{k}}}").as_bytes(), &named("a")).is_err(),
+        "a name of nothing"
+    );
+}
+
+#[test]
+fn positions_in_one_matrix() {
+    let k = r#""K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]]"#;
+    let eye = |more: &str| read(&format!("{{{k}, {more}}}")).seen(None).unwrap().camera.eye;
+    let at = DVec3::new(-1.0, -2.0, -5.0);
+    assert_eq!(eye(r#""RT": [[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 5]]"#), at);
+    assert_eq!(eye(r#""extrinsic": [[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 5], [0, 0, 0, 1]]"#), at);
+    assert_eq!(eye(r#""c2w": [[1, 0, 0, -1], [0, 1, 0, -2], [0, 0, 1, -5], [0, 0, 0, 1]]"#), at);
+}
+
+/// One of two calibrated cameras, which are not in a world; one of a file with a fisheye.
+#[test]
+fn one_of_several_cameras() {
+    let pair = r#"{"M1": [[500, 0, 320], [0, 500, 240], [0, 0, 1]], "D1": [0.1, 0, 0, 0],
+        "M2": [[510, 0, 320], [0, 510, 240], [0, 0, 1]], "R": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "T": [1, 0, 0]}"#;
+    let two = read_at("camera", pair.as_bytes(), &named("M2")).unwrap();
+    assert!(!two.has_position() && two.seen(Some((640, 480))).unwrap().lens.is_none());
+    assert!(refusal(pair).contains("M1, M2"));
+    let kalibr = "cam0:\n  camera_model: pinhole\n  intrinsics: [500, 500, 320, 240]\n  resolution: [640, 480]\n\
+        cam1:\n  camera_model: pinhole\n  distortion_model: equidistant\n  intrinsics: [500, 500, 320, 240]\n";
+    assert!(read_at("camera", kalibr.as_bytes(), &named("cam0")).is_ok());
+    assert!(refusal(kalibr).contains("equidistant"));
+}
+
 const OPENCV_YAML: &str = "%YAML:1.0
 ---
 image_width: 640

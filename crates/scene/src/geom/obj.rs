@@ -363,7 +363,7 @@ mod tests {
     #[test]
     fn another_reader_agrees() {
         let text = "mtllib a.mtl\no one\nv 0 0 0\nv 1.5 0 0\nv 1.5e0 1 0\nv 0 1 -2\nvt 0 0\nvn 0 0 1\n\
-                    usemtl red\ns 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\nl 1 2\ng two\nv 3 3 3 1 0 0\nf -1 -3 -2\n\
+                    usemtl red\ns 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\nl 1 2\ng two\nv 3 3 3\nf -1 -3 -2\n\
                     f 1//1 3//1 5//1\n";
         let options =
             tobj::LoadOptions { triangulate: true, ignore_lines: true, ..Default::default() };

@@ -88,10 +88,13 @@ fn text(text: &str) -> Result<MeshFile, GeomError> {
     let (mut out, mut cutter) = (MeshFile::default(), Cutter::default());
     let (mut names, mut part) = (IndexSet::<Arc<str>>::new(), 0);
     let mut corners: Vec<u32> = Vec::new();
+    // A file that was cut off is text, too.
+    let mut ended = true;
     for (i, line) in text.lines().enumerate() {
         let at = |what: &str| GeomError::invalid(format!("line {} of the STL file: {what}", i + 1));
         let mut words = line.split_whitespace();
         let word = words.next().unwrap_or_default().to_ascii_lowercase();
+        ended = word == "endsolid" || word.is_empty() && ended;
         match &*word {
             "vertex" => {
                 let mut number = || words.next().and_then(|w| w.parse::<f32>().ok());
@@ -121,6 +124,9 @@ fn text(text: &str) -> Result<MeshFile, GeomError> {
             "" | "facet" | "outer" | "endfacet" | "endsolid" | "color" => {}
             _ => return Err(at("expected `facet`, `vertex x y z` or `endsolid`")),
         }
+    }
+    if !ended {
+        return Err(GeomError::invalid("the STL file ends too early, without `endsolid`"));
     }
     out.part_names = names.into_iter().collect();
     Ok(out)
@@ -198,5 +204,10 @@ mod tests {
         assert!(fails(b"solid\nvertex 1 2\n").starts_with("line 2 of the STL file: a vertex"));
         assert!(fails(b"solid\nvertices\n").starts_with("line 2 of the STL file: expected"));
         assert!(fails(b"solid\nendloop\n").contains("three vertices"));
+        let whole = text_file();
+        let lines: Vec<&str> = whole.lines().collect();
+        for cut in 2..lines.len() {
+            assert!(fails(lines[..cut].join("\n").as_bytes()).contains("ends too early"), "{cut}");
+        }
     }
 }

@@ -3,7 +3,6 @@
 
 use super::joint_lists::Extra;
 use super::joints::{of_person, triples};
-use super::layouts::{fractions_if_small, of_ultralytics};
 use super::names::usual;
 use super::node::Node;
 use super::people::{Person, number};
@@ -63,9 +62,6 @@ pub(super) fn people(all: &Node, root: &Node) -> Result<Vec<Person>, KeypointsEr
             }
         }
         people.push(person);
-    }
-    if all.items().any(|n| of_ultralytics(&n)) {
-        fractions_if_small(&mut people);
     }
     if people.len() > 1 || people.iter().any(|p| !p.image.is_empty()) {
         number(&mut people);

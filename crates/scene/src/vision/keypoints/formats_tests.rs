@@ -33,6 +33,65 @@ fn flat(count: usize) -> Vec<f64> {
     (0..count).flat_map(|i| [10.0 + i as f64, 20.0, 0.5]).collect()
 }
 
+/// The photograph's name picks people of the picture of that name, never a number that happens to
+/// be the same.
+#[test]
+fn the_photograph_is_no_number_of_a_person() {
+    let one = |id: u32, image: u32, x: f64| {
+        let joints: Vec<f64> = (0..17).flat_map(|i| [x, 50.0 + f64::from(i), 2.0]).collect();
+        json!({ "id": id, "image_id": image, "category_id": 1, "keypoints": joints })
+    };
+    let coco = of(&json!({
+        "images": [{ "id": 5, "file_name": "1.jpg" }, { "id": 6, "file_name": "2.jpg" }],
+        "annotations": [one(1, 6, 60.0), one(7, 5, 70.0)],
+    }));
+    let nose = |k: Keypoints| at(&k, "nose").unwrap().0;
+    assert_eq!(nose(coco.pick(None, Some("1")).unwrap()), 70.0);
+    assert_eq!(nose(coco.pick(Some("1"), None).unwrap()), 60.0);
+    assert!(coco.pick(None, Some("5")).is_err());
+    let results = of(&json!([one(1, 139, 60.0), one(2, 785, 70.0)]));
+    assert_eq!(nose(results.pick(None, Some("000000000785")).unwrap()), 70.0);
+    assert!(results.pick(None, Some("1")).is_err());
+    let people =
+        json!({ "people": [{ "pose_keypoints_2d": flat(25) }, { "pose_keypoints_2d": flat(25) }] });
+    assert!(of(&people).pick(None, Some("2")).is_err());
+}
+
+#[test]
+fn a_picture_of_mmpose_with_its_meta_info() {
+    let names: serde_json::Map<String, Value> = [("0", "nose"), ("1", "left_eye")]
+        .map(|(k, v)| (k.to_owned(), v.into()))
+        .into_iter()
+        .collect();
+    let instance =
+        json!({ "keypoints": [[120.5, 80.0], [130.0, 70.0]], "keypoint_scores": [0.9, 0.8] });
+    let k =
+        only(&json!({ "meta_info": { "keypoint_id2name": names }, "instance_info": [instance] }));
+    assert_eq!(at(&k, "l_eye"), Some((130.0, 70.0, 0.8)));
+}
+
+/// Fractions, with a joint beside the picture, whatever wrote them.
+#[test]
+fn bodies_of_two_pixels_are_fractions() {
+    let x = |i: usize| 0.2 + 0.05 * i as f64;
+    let joints: Vec<[f64; 2]> = (0..17).map(|i| [x(i), 0.5]).collect();
+    let listed: Vec<f64> = joints.iter().flat_map(|[x, y]| [*x, *y, 0.9]).collect();
+    for v in [
+        json!([{ "keypoints": joints, "keypoint_scores": vec![0.9; 17] }]),
+        json!([{ "image_id": 1, "keypoints": listed }]),
+        json!({ "keypoints": [joints], "scores": [vec![0.9; 17]] }),
+        json!({ "nose": [0.5, 0.1], "l_eye": [0.5, 0.1], "r_eye": [0.5, 0.1], "l_hip": [1.04, 0.9] }),
+    ] {
+        assert!(only(&v).is_normalised(), "{v}");
+    }
+    assert!(
+        !only(&json!({ "nose": [1, 1], "l_eye": [1, 1], "r_eye": [1, 1], "l_hip": [5, 9] }))
+            .is_normalised()
+    );
+    let pixels = format!("0 100 200 50 60{}", " 100 200 2".repeat(17));
+    assert!(said(&pixels).contains("fractions"), "{}", said(&pixels));
+}
+
 #[test]
 fn openpose_with_feet_hands_and_face() {
     let mut body = flat(25);

@@ -6,6 +6,9 @@ use super::joint_lists::LISTS;
 use super::joints::{listed, names_of};
 use super::people::{Person, number};
 
+/// The largest fraction of a picture's side, of a joint beside the picture.
+const MOST: f64 = 2.0;
+
 /// The numbers of a line before its joints: class and box.
 const BEFORE: usize = 5;
 
@@ -38,6 +41,12 @@ pub(super) fn people(text: &str) -> Result<Vec<Person>, KeypointsError> {
         };
         let joints: Vec<[f64; 3]> =
             joints.chunks_exact(each).take(count).filter_map(joint).collect();
+        if let Some([x, y, _]) = joints.iter().find(|[x, y, _]| x.max(*y) > MOST) {
+            let message = format!(
+                "{place} has a joint at {x}, {y}; fractions of the picture's sides are expected"
+            );
+            return Err(KeypointsError::new(message));
+        }
         let keypoints = listed(names_of(count, None, &place)?, &joints)?.into_normalised();
         people.push(Person { keypoints, ..Person::default() });
     }

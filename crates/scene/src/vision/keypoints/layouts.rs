@@ -5,9 +5,9 @@
 //! person, `people.rs` chooses one.
 
 use super::joint_lists::known;
-use super::joints::{is_columns, named, of_person, rows, scores};
+use super::joints::{named, of_person, rows, scores};
 use super::node::Node;
-use super::people::{People, Person, number};
+use super::people::{People, Person, file_names, number};
 use super::{Keypoints, KeypointsError, arrays, coco, labels, mediapipe, openpose, tables};
 use crate::vision::npy;
 use serde_json::Value;
@@ -21,8 +21,7 @@ impl People {
     pub fn parse(bytes: &[u8]) -> Result<People, KeypointsError> {
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         if npy::is_npy(bytes) || bytes.starts_with(b"PK\x03\x04") {
-            let all = people(&Node::root(&arrays::read(bytes)?))?;
-            return Ok(People { all });
+            return people(&Node::root(&arrays::read(bytes)?)).map(People::new);
         }
         if bytes.starts_with(b"\x89HDF") {
             let error = KeypointsError::new("it is an HDF5 file, which is not read");
@@ -33,16 +32,20 @@ impl People {
         if begins.is_ascii_alphanumeric() || b",\"-.+".contains(&begins) {
             let text = String::from_utf8_lossy(bytes);
             if labels::is_labels(&text) {
-                return Ok(People { all: labels::people(&text)? });
+                return labels::people(&text).map(People::new);
             }
             if tables::is_table(&text) {
-                return Ok(People { all: tables::people(&text)? });
+                return tables::people(&text).map(People::new);
             }
         }
         let document = serde_json::from_slice(bytes)
             .map_err(|e| KeypointsError::new(format!("not JSON: {e}")))?;
-        let all = people(&Node::root(&document))?;
-        Ok(People { all })
+        people(&Node::root(&document)).map(People::new)
+    }
+
+    fn new(mut all: Vec<Person>) -> People {
+        fractions_if_small(&mut all);
+        People { all }
     }
 }
 
@@ -130,7 +133,8 @@ fn by_id(root: &Node) -> Result<Vec<Person>, KeypointsError> {
             let people = openpose::people(&n)?;
             all.extend(people.into_iter().map(|p| p.of_picture(id)));
         } else {
-            all.push(Person { id: id.to_owned(), ..person(&n)? });
+            let files = file_names(id).map(str::to_owned).to_vec();
+            all.push(Person { id: id.to_owned(), files, ..person(&n)? });
         }
     }
     number(&mut all);
@@ -156,9 +160,16 @@ fn person(of: &Node) -> Result<Person, KeypointsError> {
     Ok(Person { keypoints, ..Person::default() })
 }
 
-/// Reads MMPose's `[{"frame_id", "instances": […]}, …]`.
+/// Reads MMPose's `[{"frame_id", "instances": […]}, …]`, or the instances of a single picture.
 fn frames(all: &Node, names: Option<&[String]>) -> Result<Vec<Person>, KeypointsError> {
     let mut people = Vec::new();
+    if all.items().any(|n| n.get("keypoints").is_some()) {
+        people = coco::instances(all, names)?;
+        if people.len() > 1 {
+            number(&mut people);
+        }
+        return Ok(people);
+    }
     for n in all.items() {
         let Some(instances) = n.get("instances") else {
             return Err(n.wrong("a frame {\"frame_id\", \"instances\"}"));
@@ -177,7 +188,7 @@ fn pictures(all: &Node) -> Result<Vec<Person>, KeypointsError> {
     for (i, n) in all.items().enumerate() {
         let of_picture = people(&n)?.into_iter().map(|p| match all.len() {
             1 => p,
-            _ => Person { id: String::new(), ..p }.of_picture(&(i + 1).to_string()),
+            _ => Person { id: String::new(), counted: true, ..p }.of_picture(&(i + 1).to_string()),
         });
         found.extend(of_picture);
     }
@@ -229,21 +240,20 @@ fn depth(value: &Value) -> (usize, &Value) {
     (deep, at)
 }
 
-/// Makes positions fractions of the picture's sides, if all of all people are from 0 to 1: some
-/// tools write either, and do not say which.
-pub(super) fn fractions_if_small(people: &mut [Person]) {
+/// The least number of joints whose positions show whether they are pixels.
+const SHOWN: usize = 4;
+
+/// Makes positions fractions of the picture's sides, if all of all people are within two pixels of
+/// its corner: many tools write either, and do not say which. Those of joints beside the picture
+/// exceed 1.
+fn fractions_if_small(people: &mut [Person]) {
     let points = || people.iter().flat_map(|p| p.keypoints.points());
-    let small = |x: f64| (0.0..=1.0).contains(&x);
-    if points().next().is_some() && points().all(|p| small(p.x) && small(p.y)) {
+    let small = |x: f64| (-1.0..=2.0).contains(&x);
+    if points().count() >= SHOWN && points().all(|p| small(p.x) && small(p.y)) {
         for p in people {
             p.keypoints = std::mem::take(&mut p.keypoints).into_normalised();
         }
     }
-}
-
-/// Whether this is `{"x": [x of each joint], "y": …}`, Ultralytics' form.
-pub(super) fn of_ultralytics(person: &Node) -> bool {
-    person.get("keypoints").is_some_and(|n| is_columns(&n))
 }
 
 impl Keypoints {

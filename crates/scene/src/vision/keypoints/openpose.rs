@@ -2,7 +2,6 @@
 
 use super::joint_lists::Extra;
 use super::joints::triples;
-use super::layouts::fractions_if_small;
 use super::node::Node;
 use super::people::{Person, number};
 use super::{Keypoints, KeypointsError};
@@ -36,7 +35,6 @@ pub(super) fn people(root: &Node) -> Result<Vec<Person>, KeypointsError> {
         let error = all.wrong("in pixels or fractions of the picture, not from -1 to 1");
         return Err(error.hint("run OpenPose with --keypoint_scale 0 or 3"));
     }
-    fractions_if_small(&mut people);
     if people.len() > 1 {
         number(&mut people);
     }

@@ -20,6 +20,10 @@ pub(super) struct Person {
     pub within: String,
     /// Ids that people in the same image share: the image's number or name, and file name.
     pub image: Vec<String>,
+    /// Those of `image` that are names of the picture's file, with and without the extension.
+    pub files: Vec<String>,
+    /// True if the image has no id but its place in the file.
+    pub counted: bool,
     pub keypoints: Keypoints,
 }
 
@@ -31,15 +35,23 @@ impl Person {
             return self;
         }
         self.image.push(id.to_owned());
-        let file = id.rsplit(['/', '\\']).next().unwrap_or(id);
-        let stem = Path::new(file).file_stem().and_then(|s| s.to_str()).unwrap_or(file);
-        for name in [file, stem] {
+        let names = file_names(id);
+        for name in names {
             if !self.image.iter().any(|i| i == name) {
                 self.image.push(name.to_owned());
             }
         }
+        if names != [id, id] {
+            self.files.extend(names.map(str::to_owned));
+        }
         self
     }
+}
+
+/// Returns the name of the file at the end of a path, with and without its extension.
+pub(super) fn file_names(path: &str) -> [&str; 2] {
+    let file = path.rsplit(['/', '\\']).next().unwrap_or(path);
+    [file, Path::new(file).file_stem().and_then(|s| s.to_str()).unwrap_or(file)]
 }
 
 /// Gives people without an id that of the image, with `:` and the name or number of the person if
@@ -86,6 +98,12 @@ pub fn split_id(path: &str) -> (&str, Option<&str>) {
 
 const EXTENSIONS: [&str; 5] = [".json", ".csv", ".txt", ".npy", ".npz"];
 
+/// Whether ids of pictures are the same: files often have a number with leading zeros for a name.
+fn same(have: &str, want: &str) -> bool {
+    let number = want.trim_start_matches('0');
+    have == want || have == number && want.bytes().all(|b| b.is_ascii_digit())
+}
+
 impl People {
     /// The number of people, including those that were searched for but not detected.
     pub fn len(&self) -> usize {
@@ -104,7 +122,8 @@ impl People {
 
     /// Returns one person: the one with the given id, or else the one of a picture whose
     /// file is called `stem` (without folder and extension), or else the only one. A file
-    /// without people gives no keypoints.
+    /// without people gives no keypoints. Where the file names no pictures, their numbers are
+    /// their names; numbers of people, and places in the file, never are.
     ///
     /// # Errors
     /// If nobody has that id, or it is ambiguous which of several people is meant.
@@ -119,7 +138,7 @@ impl People {
             ([], _) => Ok(Keypoints::default()),
             ([one], _) => Ok(one.keypoints.clone()),
             (_, Some(stem)) => {
-                match self.find(stem)? {
+                match self.of_file(stem)? {
                     Some(p) => Ok(p.keypoints.clone()),
                     None => Err(self
                         .several(&format!("; none of them has the name of the picture, `{stem}`"))),
@@ -133,10 +152,24 @@ impl People {
         if let Some(p) = self.all.iter().find(|p| p.id == id) {
             return Ok(Some(p));
         }
-        // Files of pictures often have a number with leading zeros for a name.
-        let number = id.trim_start_matches('0');
-        let same = |i: &String| i == id || i == number && id.bytes().all(|b| b.is_ascii_digit());
-        let found: Vec<&Person> = self.all.iter().filter(|p| p.image.iter().any(same)).collect();
+        self.one(id, |p| p.image.iter().any(|i| same(i, id)))
+    }
+
+    /// The person of the picture whose file is called `stem`.
+    fn of_file(&self, stem: &str) -> Result<Option<&Person>, KeypointsError> {
+        if self.all.iter().any(|p| !p.files.is_empty()) {
+            return self.one(stem, |p| p.files.iter().any(|f| f == stem));
+        }
+        self.one(stem, |p| !p.counted && p.image.iter().any(|i| same(i, stem)))
+    }
+
+    /// The only person of whom this is true, if there is one.
+    fn one(
+        &self,
+        id: &str,
+        is: impl Fn(&Person) -> bool,
+    ) -> Result<Option<&Person>, KeypointsError> {
+        let found: Vec<&Person> = self.all.iter().filter(|p| is(p)).collect();
         match found[..] {
             [] => Ok(None),
             [one] => Ok(Some(one)),
