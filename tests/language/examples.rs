@@ -16,6 +16,11 @@ fn files() -> Folder {
     let ball = png(disc(64, 64, 32.0, 32.0, 15.0));
     f.write("ball.png", &ball).write("mask.png", &ball);
     f.write("depth.npy", pcadlang_scene::vision::npy::f32_array(&[32, 32], [7.0; 32 * 32]));
+    f.write(
+        "transforms.json",
+        r#"{ "camera_angle_x": 0.7, "w": 64, "h": 64, "frames": [{ "file_path": "./ball", "transform_matrix":
+            [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 6], [0, 0, 0, 1]] }] }"#,
+    );
     f.write("person.json", include_str!("../../examples/images/skier.keypoints.json"));
     f.succeeds(&["contours", "ball.png", "-o", "contours.png"]);
     // Shipped files are found by their names from the current folder alone, which tests of

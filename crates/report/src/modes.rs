@@ -81,7 +81,7 @@ pub fn modes(quantities: &[Quantity], evidence: Option<&Evidence>) -> Vec<Mode> 
 
 /// Returns the quantities on which chains may disagree, the worst first. Those that never
 /// moved in any chain have no R-hat, but may differ between chains. One that is missing from some
-/// draws, or infinite in some, has none either, and says nothing.
+/// draws, or infinite in some, has none either, and is ignored.
 fn apart(quantities: &[Quantity]) -> Vec<&Quantity> {
     let rank = |q: &Quantity| match q.summary.r_hat {
         r if !r.is_nan() => r,

@@ -38,6 +38,14 @@ assume r ~ uniform(0.5, 1.5);
 observe scene.depth(scene.render(scene.sphere(r)), size = 32) = seen as distance;",
     ),
     (
+        "camera",
+        "\
+data taken = camera(\"transforms.json#ball\");
+data seen = mask(\"mask.png\");
+assume r ~ uniform(0.5, 1.5);
+observe scene.mask(scene.render(scene.sphere(r), camera = taken), size = 32) = seen as outline;",
+    ),
+    (
         "armature",
         "data body = armature(\"std/human/human.lod2.rig.json\");\nlet n = len(body.joints);",
     ),

@@ -47,7 +47,7 @@ impl MeshFile {
 
     /// Turns over closed bodies that are inside out; see [`face_outward`].
     pub fn outward(mut self) -> MeshFile {
-        self.remarks.extend(face_outward(&self.positions, &mut self.triangles));
+        self.remarks.extend(face_outward(&self.positions, &mut self.triangles, &self.parts));
         self
     }
 

@@ -3,7 +3,8 @@
 //! A body is a set of faces connected by edges, after equal positions are merged. It is
 //! closed if each edge is used equally often in both directions; then its signed volume
 //! (the sum of a . (b x c) / 6 over its faces) does not depend on the origin, and is
-//! negative if the faces look inwards. A body that no other encloses decides for all in
+//! negative if the faces look inwards. A part that is closed by itself is apart from others
+//! whose edges it touches. A body that no other encloses decides for all in
 //! it: the inner wall of a hollow vase has a negative volume, and is right.
 
 use super::{Bounds, weld};
@@ -15,10 +16,15 @@ const MOST_WORK: usize = 50_000_000;
 const FLAT: f64 = 1e-9;
 
 /// Turns over the closed bodies that are inside out. `triangles` are indices into
-/// `positions`. Returns what users should know of it, if any were turned.
-pub fn face_outward(positions: &[Vec3], triangles: &mut [[u32; 3]]) -> Option<String> {
+/// `positions`, `parts` the number of each triangle's part. Returns what users should know of it,
+/// if any were turned.
+pub fn face_outward(
+    positions: &[Vec3],
+    triangles: &mut [[u32; 3]],
+    parts: &[u16],
+) -> Option<String> {
     let corners = |face: &u32| triangles[*face as usize].map(|v| positions[v as usize].as_dvec3());
-    let mut bodies: Vec<Body> = closed(&weld(positions), triangles)
+    let mut bodies: Vec<Body> = closed(&weld(positions), triangles, parts)
         .into_iter()
         .filter_map(|faces| Body::new(faces, corners))
         .collect();
@@ -119,8 +125,9 @@ fn winds_around(surface: impl Iterator<Item = [DVec3; 3]>, point: DVec3) -> bool
 }
 
 /// Returns the faces of each closed body, in the order of their first faces.
-fn closed(weld: &[u32], triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
-    // For each edge its ends, then the face, twice, plus one if it runs from high to low.
+fn closed(weld: &[u32], triangles: &[[u32; 3]], parts: &[u16]) -> Vec<Vec<u32>> {
+    let part = |f: u32| parts.get(f as usize).copied().unwrap_or_default();
+    // For each edge its ends, the part, then the face, twice, plus one if it runs from high to low.
     let mut edges = Vec::with_capacity(triangles.len() * 3);
     for (f, t) in triangles.iter().enumerate() {
         let t = t.map(|v| weld[v as usize]);
@@ -128,24 +135,31 @@ fn closed(weld: &[u32], triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
             continue;
         }
         for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
-            edges.push((a.min(b), a.max(b), 2 * f as u32 + u32::from(a > b)));
+            let f = f as u32;
+            edges.push((a.min(b), a.max(b), u32::from(part(f)), 2 * f + u32::from(a > b)));
         }
     }
     edges.sort_unstable();
-    let same_edge = |a: &(u32, u32, u32), b: &(u32, u32, u32)| (a.0, a.1) == (b.0, b.1);
+    type Use = (u32, u32, u32, u32);
+    let same_edge = |a: &Use, b: &Use| (a.0, a.1, a.2) == (b.0, b.1, b.2);
+    let balanced = |uses: &[Use]| 2 * uses.iter().filter(|e| e.3 % 2 == 1).count() == uses.len();
+    // Parts that are not closed by themselves are one.
+    let mut whole = vec![true; 1 << 16];
+    for uses in edges.chunk_by(same_edge).filter(|uses| !balanced(uses)) {
+        whole[uses[0].2 as usize] = false;
+    }
+    edges.iter_mut().filter(|e| !whole[e.2 as usize]).for_each(|e| e.2 = u32::MAX);
+    edges.sort_unstable();
     let mut first: Vec<u32> = (0..triangles.len() as u32).collect();
     for uses in edges.chunk_by(same_edge) {
         for pair in uses.windows(2) {
-            let (a, b) = (root(&mut first, pair[0].2 / 2), root(&mut first, pair[1].2 / 2));
+            let (a, b) = (root(&mut first, pair[0].3 / 2), root(&mut first, pair[1].3 / 2));
             first[a.max(b) as usize] = a.min(b);
         }
     }
     let mut open = vec![false; triangles.len()];
-    for uses in edges.chunk_by(same_edge) {
-        let down = uses.iter().filter(|e| e.2 % 2 == 1).count();
-        if 2 * down != uses.len() {
-            open[root(&mut first, uses[0].2 / 2) as usize] = true;
-        }
+    for uses in edges.chunk_by(same_edge).filter(|uses| !balanced(uses)) {
+        open[root(&mut first, uses[0].3 / 2) as usize] = true;
     }
     let mut number = vec![usize::MAX; triangles.len()];
     let mut bodies: Vec<Vec<u32>> = Vec::new();
@@ -204,7 +218,7 @@ mod tests {
     /// Turns what must be; returns the volume then, and the remark.
     fn turned(all: &[(f32, f32, bool)]) -> (f64, String) {
         let (positions, mut triangles) = cubes(all);
-        let remark = face_outward(&positions, &mut triangles).unwrap_or_default();
+        let remark = face_outward(&positions, &mut triangles, &[]).unwrap_or_default();
         ((volume(&positions, &triangles) * 1000.0).round() / 1000.0, remark)
     }
 
@@ -233,15 +247,30 @@ mod tests {
         assert_eq!(turned(&[(2.0, 0.0, false), (1.0, 1.0, true)]).0, 9.0);
     }
 
+    /// Two parts that share the edges of a face; halves of one body that are not closed alone.
+    #[test]
+    fn a_part_that_is_closed_stands_alone() {
+        let (positions, mut triangles) = cubes(&[(1.0, 0.0, false), (1.0, 1.0, true)]);
+        let half = triangles.len() / 2;
+        let parts: Vec<u16> = (0..2 * half).map(|f| (f / half) as u16).collect();
+        let remark = face_outward(&positions, &mut triangles, &parts).unwrap();
+        assert!(remark.starts_with("1 of 2 closed bodies is"), "{remark}");
+        assert!((volume(&positions, &triangles) - 2.0).abs() < 1e-6);
+        let (positions, mut triangles) = cubes(&[(1.0, 0.0, true)]);
+        let parts: Vec<u16> = (0..triangles.len()).map(|f| (f % 3) as u16).collect();
+        assert!(face_outward(&positions, &mut triangles, &parts).is_some());
+        assert!((volume(&positions, &triangles) - 1.0).abs() < 1e-6);
+    }
+
     #[test]
     fn what_is_not_closed_stays_as_it_is() {
         let (positions, mut triangles) = cubes(&[(1.0, 0.0, true)]);
         triangles.pop();
         let before = triangles.clone();
-        assert_eq!(face_outward(&positions, &mut triangles), None);
+        assert_eq!(face_outward(&positions, &mut triangles, &[]), None);
         assert_eq!(triangles, before);
         let mut sheet = vec![[0, 1, 2], [0, 2, 1], [0, 0, 1]];
-        assert_eq!(face_outward(&positions, &mut sheet), None);
-        assert_eq!(face_outward(&[], &mut []), None);
+        assert_eq!(face_outward(&positions, &mut sheet, &[]), None);
+        assert_eq!(face_outward(&[], &mut [], &[]), None);
     }
 }

@@ -100,7 +100,7 @@ impl Loaded {
     /// Turns over closed bodies that are inside out; see [`face_outward`].
     #[must_use]
     pub fn outward(mut self) -> Loaded {
-        self.remarks.extend(face_outward(&self.positions, &mut self.triangles));
+        self.remarks.extend(face_outward(&self.positions, &mut self.triangles, &self.parts));
         self
     }
 
