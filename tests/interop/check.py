@@ -106,13 +106,15 @@ def check(run):
             az.plot_trace(data, var_names=names[:3], backend="matplotlib")
     if run.endswith("/line") and not (stats["step_size"].values > 0).all():
         sys.exit(f"{run}: no step sizes of NUTS")
-    loo = az.loo(store)
-    elpd = loo.elpd_loo if OLD else loo.elpd
+    # A slow machine makes a few draws of a picture in ten seconds; ArviZ 1.3 wants five in the tail.
+    enough = store["posterior"].sizes["chain"] * store["posterior"].sizes["draw"] >= 100
+    loo = az.loo(store) if enough else None
+    elpd = float("nan") if loo is None else loo.elpd_loo if OLD else loo.elpd
     total = store["log_likelihood"]["observed"].sum("observation").values
     # The factors of lathe.pcad, about its box and the frame, are no observations.
     if not run.endswith("/lathe"):
         np.testing.assert_allclose(total, stats["log_likelihood_sum"].values, rtol=1e-9, atol=1e-9)
-    if OLD:
+    if OLD and enough:
         close(f"{run}: elpd_loo", elpd, az.loo(csv).elpd_loo, 1e-9)
     labels = store["log_likelihood"]["observation"].values.tolist()
     if store["observed_data"]["observed"].shape != (len(labels),):

@@ -74,7 +74,7 @@ def joined(chains: Sequence[Groups]) -> Groups:
 
 
 def recoded(parts: Sequence[dict[str, Array]]) -> Sequence[dict[str, Array]]:
-    """The same arrays, where texts have the same numbers in all chains (`NAME_level` lists them)."""
+    """The same arrays, where texts have the same numbers in all chains (`NAME_level`)."""
     parts = [dict(part) for part in parts]
     for level in dict.fromkeys(n for part in parts for n in part if n.endswith("_level")):
         own = [part[level][1].tolist() if level in part else [] for part in parts]
