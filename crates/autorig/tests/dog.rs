@@ -143,7 +143,9 @@ fn its_groups_become_its_limbs() {
 #[test]
 fn inside_out_it_is_the_same() {
     let flip = |line: &str| match line.split(' ').collect::<Vec<_>>()[..] {
-        ["f", a, b, c] => format!("f {a} {c} {b}\n"),
+        ["f", ref corners @ ..] => {
+            format!("f {}\n", corners.iter().rev().copied().collect::<Vec<_>>().join(" "))
+        }
         _ => format!("{line}\n"),
     };
     let flipped: String = dog().lines().map(flip).collect();
