@@ -66,6 +66,8 @@ fn copies_of_a_mesh_are_parts() {
     let (w, d) = copies(false);
     let all = read(&glb(w, d));
     assert_eq!(all.names, ["E", "E#2", "E#3", "E#4"]);
+    let mesh = all.clone().mesh().unwrap();
+    assert!(mesh.topology.part_names.iter().map(|n| &**n).eq(["E", "E#2", "E#3", "E#4"]));
     assert_eq!((all.triangles.len(), all.parts[47], all.remarks.len()), (48, 3, 0));
     assert_eq!(size(&all.positions), DVec3::new(7.0, 3.0, 1.0));
     assert!((volume(&all) - 6.0).abs() < 1e-9, "a mirrored copy keeps its outside");

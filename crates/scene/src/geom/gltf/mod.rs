@@ -109,7 +109,10 @@ impl Loaded {
     /// # Errors
     /// As [`Mesh::new`]: no triangle with positive area.
     pub fn mesh(self) -> Result<Mesh, GeomError> {
-        Mesh::new(self.positions, self.triangles, self.parts)
+        let mut mesh = Mesh::new(self.positions, self.triangles, self.parts)?;
+        let names = self.names.iter().map(|name| Arc::from(&**name));
+        Arc::make_mut(&mut mesh.topology).part_names = names.collect();
+        Ok(mesh)
     }
 
     /// Returns the meshes that joints move as a body, with their morphs; other meshes are
