@@ -308,6 +308,42 @@ fn moves_are_seen_by_who_watches() {
     assert!(moves > 5, "{moves}");
 }
 
+/// What no choice affects is computed once for all traces of a program; what a choice affects, by
+/// however many functions, is drawn in each.
+#[test]
+fn settled_values_are_computed_once() {
+    let few = Limits { operations: 200, ..Limits::default() };
+    let text = "fn grown(k) { fold(fn(sum, i) { sum + k * i }, 0, 0 .. 100) }
+                fn adder(k) { fn(x) { x + k } }
+                let table = map(grown, [1, 2]);
+                let total = sum(concat(table, [grown(3)]));
+                let shift = adder(2);
+                assume x ~ normal(total, 1); observe normal(shift(x), 1) = 0;";
+    let (model, first) = trace(text, 1);
+    let next = |code, seed| {
+        let draws = Streams { key: StreamKey::new(seed, 0, Purpose::START), step: 0, substream: 0 };
+        Trace::simulate(code, draws, few.clone())
+    };
+    let second = next(model.code().clone(), 1).unwrap();
+    assert_eq!(second.log_joint().to_bits(), first.log_joint().to_bits());
+    let fresh = Model::from_text(text).unwrap();
+    assert!(next(fresh.code().clone(), 1).is_err(), "the first trace computes them");
+    for text in [
+        "fn noisy() { z ~ normal(0, 1); z } let y = noisy();",
+        "fn noisy(i) { z ~ normal(i, 1); z } let y = sum(map(noisy, [1, 2]));",
+        "fn noisy(i) { z ~ normal(i, 1); z } fn apply(f) { f(1) } let y = apply(noisy);",
+        "fn noisy(i) { z ~ normal(i, 1); z } let all = { f: noisy }; let y = [all][0].f(1);",
+        "assume a ~ normal(0, 1); fn of(k) { fn() { a + k } } let f = of(1); let y = f();",
+        "let y = if true { z ~ normal(0, 1); z } else { 0 };",
+        "let f = mem(fn(k) { z ~ normal(0, 1); z + k }); let y = f(1);",
+        "for i in 0 .. 3 { z[i] ~ normal(0, 1); } let y = sum(z);",
+    ] {
+        let (model, first) = trace(&format!("{text} observe normal(y, 1) = 0;"), 1);
+        let second = next(model.code().clone(), 2).unwrap();
+        assert_ne!(second.log_likelihood().to_bits(), first.log_likelihood().to_bits(), "{text}");
+    }
+}
+
 /// With n conditionally independent observations, changing one local choice executes the
 /// same few operations at any n.
 #[test]

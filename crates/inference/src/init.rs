@@ -347,6 +347,11 @@ mod tests {
             limits: &limits,
             last: None,
         };
+        // Functions that make no choice are no part of the state either.
+        let same = text.replace("normal(m +", "normal(sum(map(twice, [m])) - m +");
+        let plan = &compiled(&format!("fn twice(x) {{ 2 * x }} {same}")).plans[0];
+        let own = ProgramKernel::new(Arc::clone(&plan.kernels), 0, Vec::new(), Instant::now());
+        assert!(own.ignores_the_state());
         // What depends on a choice is another matter.
         let other = text.replace("normal(m +", "normal(m + x +");
         let plan = &compiled(&other).plans[0];

@@ -271,6 +271,16 @@ impl Value {
         }
     }
 
+    /// True if it refers to no frame or node of a trace.
+    pub fn is_portable(&self) -> bool {
+        match self {
+            Value::Closure(_) | Value::Memo(_) | Value::Container(_) => false,
+            Value::List(items) => items.iter().all(Value::is_portable),
+            Value::Record(fields) => fields.values().all(Value::is_portable),
+            _ => true,
+        }
+    }
+
     /// Returns the numbers in it, flattened: bools as 0 and 1, arrays and records element
     /// by element, objects by [`Object::numbers`]; none for anything else.
     pub fn numbers(&self) -> Vec<f64> {

@@ -143,6 +143,9 @@ impl View {
     /// that are requested later.
     pub fn depth(&self, size: u32) -> Arc<Frame> {
         let pictures = self.of(size);
+        if self.is_read(Channel::Frame, size) {
+            return self.frame(size);
+        }
         pictures.with_depth().cloned().unwrap_or_else(|| {
             let contours = pictures.change.get().is_some() || self.is_read(Channel::Contours, size);
             // The canvas has meshes only.

@@ -2,11 +2,13 @@
 
 use super::op::{Callee, Op, Operand};
 use super::program::{Block, Code, Eager};
+use super::settled::Settled;
 use super::slots::SlotFacts;
 use super::{dependents::dependents, flatten};
-use crate::lang::ids::OpId;
+use crate::lang::ids::{BlockId, OpId};
 use crate::lang::local_density::LocalDensity;
 use crate::lang::value::Value;
+use std::sync::Arc;
 
 impl Code {
     /// Derives the facts about all slots from the operations, among them users and
@@ -14,7 +16,10 @@ impl Code {
     pub fn finish(&mut self) {
         flatten::flatten(self);
         let effects = self.effects();
-        for (block, is_effect) in self.blocks.iter_mut().zip(effects) {
+        let mut settled = Settled::default();
+        let root = self.blocks[BlockId::ROOT].slots();
+        let settled: Vec<bool> = root.map(|slot| settled.slot(self, slot)).collect();
+        for ((id, block), is_effect) in self.blocks.iter_mut().enumerate().zip(effects) {
             block.effects = block.slots().filter(|s| is_effect[*s]).collect();
             block.first = OpId::new(self.ops.len());
             let mut users = vec![Vec::new(); block.ops.len()];
@@ -44,6 +49,7 @@ impl Code {
                     reads: op.reads(),
                     users: users.into(),
                     local_density: None,
+                    settled: (id == 0 && settled[slot.index()]).then(Arc::default),
                 });
                 self.ops.push(op);
             }

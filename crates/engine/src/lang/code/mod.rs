@@ -11,10 +11,12 @@ mod finish;
 mod flatten;
 mod op;
 mod program;
+mod settled;
 mod slots;
 mod surrogate;
 
 pub use super::ids::{BlockId, OpId, SiteId, Slot};
 pub use op::{Callee, DistSpec, ElementDraw, ElementKey, Op, Operand, Probe};
 pub use program::{Block, BlockKind, Code, Eager, Force, Observed, Site, SiteSegment, SiteTag};
+pub use settled::Settled;
 pub use slots::SlotFacts;

@@ -3,6 +3,8 @@
 
 use crate::lang::ids::Slot;
 use crate::lang::local_density::LocalDensity;
+use crate::lang::value::Value;
+use std::sync::{Arc, OnceLock};
 
 /// Static facts about a slot.
 #[derive(Clone, Debug, Default)]
@@ -23,4 +25,6 @@ pub struct SlotFacts {
     /// For a choice or an element of an array: the scores of its block as a function of
     /// its value.
     pub local_density: Option<Box<LocalDensity>>,
+    /// For a settled value of the top level: the value, once a trace has computed it.
+    pub settled: Option<Arc<OnceLock<Value>>>,
 }

@@ -30,7 +30,7 @@ impl Code {
         // Scaffolds and local densities were found for the original program, so they are
         // dropped.
         for facts in &mut code.slots {
-            let SlotFacts { slot, is_effect, is_draw, is_result, reads, users, .. } =
+            let SlotFacts { slot, is_effect, is_draw, is_result, reads, users, settled, .. } =
                 std::mem::take(facts);
             *facts = SlotFacts {
                 slot,
@@ -39,6 +39,7 @@ impl Code {
                 is_result,
                 reads,
                 users,
+                settled,
                 ..SlotFacts::default()
             };
         }

@@ -4,11 +4,10 @@
 use super::lowerer::{Lowerer, Lowering, PlanScope, Typed};
 use super::scope::{Binding, Body, Meaning, Scope, ScopeKind};
 use crate::lang::builtins::{Builtin, PlanForm, Type};
-use crate::lang::code::{Block, BlockId, BlockKind, Op, Operand, Slot};
+use crate::lang::code::{Block, BlockId, BlockKind, Op, Operand, Settled, Slot};
 use crate::lang::plan::{Argument, Formula, FormulaKind, Given, Path, PathSegment, Selection};
 use pcadlang_syntax::ast::{Arg, Expr};
 use pcadlang_syntax::span::Span;
-use rustc_hash::FxHashSet;
 use std::sync::Arc;
 
 /// The slots that a function reads.
@@ -96,8 +95,11 @@ impl Lowerer<'_> {
 
     /// Returns the slots that a function and the blocks inside of it read.
     fn reads(&self, function: BlockId) -> Reads {
-        let mut reads = Reads { own: Vec::new(), is_closed: true, is_settled: true };
-        let mut settled = FxHashSet::default();
+        let mut reads = Reads {
+            own: Vec::new(),
+            is_closed: true,
+            is_settled: Settled::default().function(&self.code, function),
+        };
         for (id, block) in self.code.blocks.iter().enumerate().skip(function.index()) {
             let id = BlockId::new(id);
             let mut operand = |o: Operand| {
@@ -112,7 +114,6 @@ impl Lowerer<'_> {
                 };
                 if at < function {
                     reads.is_closed = false;
-                    reads.is_settled &= at == BlockId::ROOT && self.is_settled(slot, &mut settled);
                 }
                 if at == function {
                     reads.own.push(slot);
@@ -123,34 +124,9 @@ impl Lowerer<'_> {
             // Functions that it calls may read the state.
             let calls = |op: &Op| matches!(op, Op::Call { .. } | Op::Map { .. } | Op::Fold { .. });
             let opens = |op: &Op| calls(op) || matches!(op, Op::Probe(_) | Op::Mem { .. });
-            if block.ops.iter().any(opens) {
-                (reads.is_closed, reads.is_settled) = (false, false);
-            }
+            reads.is_closed &= !block.ops.iter().any(opens);
         }
         reads
-    }
-
-    /// True if a value of the top level is computed without choices and without calls of
-    /// functions of the program. `known` are some that are.
-    fn is_settled(&self, slot: Slot, known: &mut FxHashSet<Slot>) -> bool {
-        if known.contains(&slot) {
-            return true;
-        }
-        let op = &self.code.blocks[BlockId::ROOT].ops[slot];
-        let mut settled =
-            matches!(op, Op::Prim { .. } | Op::Array(_) | Op::Record { .. } | Op::Index { .. });
-        op.operands(&mut |o| {
-            settled = settled
-                && match o {
-                    Operand::Const(_) => true,
-                    Operand::Local(slot) => self.is_settled(slot, known),
-                    Operand::Outer { .. } => false,
-                };
-        });
-        if settled {
-            known.insert(slot);
-        }
-        settled
     }
 
     /// Lowers a built-in of inference blocks within an expression: the plan supplies its

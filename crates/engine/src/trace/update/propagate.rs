@@ -160,6 +160,9 @@ impl Graph {
                 State::Running => {}
                 state => {
                     self.update.save(&mut self.store, n);
+                    if state == State::Empty && self.incremental && self.take_settled(n) {
+                        continue;
+                    }
                     let node = &mut self.store[n];
                     node.state = State::Running;
                     if state == State::Stale {
@@ -176,6 +179,15 @@ impl Graph {
             }
         }
         Ok(())
+    }
+
+    /// Gives a node the value that another trace has computed, if no choice affects it.
+    fn take_settled(&mut self, n: NodeId) -> bool {
+        let known = self.store.slot_facts(n).settled.as_ref().and_then(|v| v.get());
+        let Some(value) = known.cloned() else { return false };
+        let node = &mut self.store[n];
+        (node.value, node.changed, node.state) = (value, self.update.epoch, State::Clean);
+        true
     }
 
     /// Pushes a node that is needed onto the stack.
@@ -309,6 +321,12 @@ impl Graph {
             }
             e
         })?;
+        if let (Poll::Ready, Some(settled)) = (&step, &self.store.slot_facts(n).settled)
+            && settled.get().is_none()
+            && self.store[n].value.is_portable()
+        {
+            let _ = settled.set(self.store[n].value.clone());
+        }
         if let (Poll::Ready, Some(log)) = (&step, &mut self.execution_log) {
             let f = &self.store[self.store[n].frame];
             log.push((f.block, n - f.base));
