@@ -86,6 +86,17 @@ const SURROGATE: Case = Case {
     ..STRUCTURE
 };
 
+/// The same in two parts, of which one waits until the other has been tested.
+const WAITING: Case = Case {
+    name: "waiting",
+    text: "assume c ~ flip(0.4);
+           assume x = if c { a ~ categorical([1, 2, 1]); a }
+                      else { b ~ gamma(2, 1); d ~ flip(0.3); if d { b } else { b + 1 } };
+           observe normal(x, sqrt(2)) = 2;
+           observe normal(x, sqrt(2)) = 2 with coarse = flat() as y;",
+    ..STRUCTURE
+};
+
 /// The masses of a model in which x is beta or gamma depending on c: by c, and by the
 /// interval of x.
 const BETA_OR_GAMMA: fn() -> Vec<f64> = || {
@@ -384,6 +395,7 @@ fn choices_that_appear_and_vanish() {
 #[test]
 fn surrogates_that_decide_first() {
     all_balanced(&SURROGATE, 20_000, kernels::balance::SURROGATE);
+    all_balanced(&WAITING, 20_000, kernels::balance::SURROGATE);
 }
 
 #[test]

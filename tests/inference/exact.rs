@@ -73,9 +73,14 @@ fn labels_are_summed_out() {
 /// kernels and with one declared in the program.
 #[test]
 fn surrogates_leave_the_posterior_as_it_is() {
-    for kernel in kernels::exact::DELAYED {
+    let surrogate = "observe normal(x, 0.5) = 2 with coarse = normal(x + 0.4, 0.8) as y;";
+    // The same likelihood in two parts, of which one waits for the second stage.
+    let waiting = "observe normal(x, sqrt(0.5)) = 2;
+                   observe normal(x, sqrt(0.5)) = 2 with coarse = flat() as y;";
+    let each = |observed| kernels::exact::DELAYED.iter().map(move |kernel| (observed, kernel));
+    for (observed, kernel) in each(surrogate).chain(each(waiting)) {
         let text = format!(
-            "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2 with coarse = normal(x + 0.4, 0.8) as y;
+            "assume x ~ normal(0, 1); {observed}
              kernel pull(s) {{ let here = value(@x); propose @x ~ normal(0.7 * here + 1, s); }}
              infer {{ warmup 2000 {{ {kernel}; }} repeat 60000 {{ {kernel}; collect x; }} }}"
         );

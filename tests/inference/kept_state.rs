@@ -56,13 +56,20 @@ fn other_data_reach_what_is_kept() {
 /// not at all for the others; the chain is the same with and without incremental updates.
 #[test]
 fn the_observation_is_evaluated_for_what_the_surrogate_accepts() {
-    let text = "assume x ~ normal(0, 3); let far = 1000 * sin(x / 1000);
-                observe normal(far, 0.3) = 2 with coarse = normal(x, 0.6) as y;";
-    let model = Model::from_text(text).unwrap();
+    let surrogate = "observe normal(far, 0.3) = 2 with coarse = normal(x, 0.6) as y;";
+    let waiting =
+        "observe normal(x, 0.6) = 2; observe normal(far, 0.3) = 2 with coarse = flat() as y;";
+    [surrogate, waiting].map(evaluated_for_what_passes);
+}
+
+fn evaluated_for_what_passes(observed: &str) {
+    let text = format!("assume x ~ normal(0, 3); let far = 1000 * sin(x / 1000); {observed}");
+    let model = Model::from_text(&text).unwrap();
     let run = |incremental: bool| {
         let mut trace = model.simulate(1, 0).unwrap();
         trace.set_incremental(incremental);
-        let at = Selector::Address(Pattern::exact(&trace.observations()[0].0));
+        let y = trace.observations().pop().unwrap().0;
+        let at = Selector::Address(Pattern::exact(&y));
         let inner = Box::new(Mh::new(scope()));
         let mut kernel = Delayed::new(inner, at, Span::default());
         kernel.step(&mut trace, &StepContext::new(1, 0, 0)).unwrap();

@@ -531,7 +531,7 @@ impl Generator {
                     boxed(Expr::Mul(boxed(p.clone()), boxed(Expr::Num(0.7)))),
                     boxed(Expr::Num(0.1)),
                 );
-                let coarse = self.coarse(Dist::Flip(softer), Dist::Flip(Expr::Num(0.4)));
+                let coarse = self.coarse([Dist::Flip(softer), Dist::Flip(Expr::Num(0.4))]);
                 Effect::Observe(name, Dist::Flip(p), f64::from(u8::from(self.chance(0.5))), coarse)
             }
             1 => {
@@ -551,7 +551,8 @@ impl Generator {
                 let (m, s) = (self.real(2), self.tenths(4, 15));
                 let shifted = Expr::Add(boxed(m.clone()), boxed(Expr::Num(0.4)));
                 let wide = Dist::Normal(shifted, Expr::Num(s * 1.5));
-                let coarse = self.coarse(wide, Dist::Normal(Expr::Num(0.3), Expr::Num(2.0)));
+                let blind = Dist::Normal(Expr::Num(0.3), Expr::Num(2.0));
+                let coarse = self.coarse([wide, blind, Dist::Flat, Dist::Flat]);
                 let s = match self.scope.grid.clone() {
                     // Invalid on one side of a number, unless a condition holds.
                     Some(x) if self.chance(0.2) => {
@@ -568,11 +569,8 @@ impl Generator {
         }
     }
 
-    fn coarse(&mut self, same: Dist, blind: Dist) -> Option<Dist> {
-        match self.rng.index(4) {
-            0 => Some(same),
-            1 => Some(blind),
-            _ => None,
-        }
+    fn coarse<const N: usize>(&mut self, some: [Dist; N]) -> Option<Dist> {
+        let i = self.rng.index(2 * N);
+        some.into_iter().nth(i)
     }
 }

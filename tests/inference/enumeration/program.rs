@@ -37,6 +37,8 @@ pub enum Dist {
     Normal(Expr, Expr),
     Beta(f64, f64),
     Poisson(Expr),
+    /// Only as a surrogate: the observation waits for the second stage.
+    Flat,
 }
 
 /// The right-hand side of a binding.
@@ -188,6 +190,7 @@ impl Program {
             Dist::Normal(m, s) => format!("normal({}, {})", self.expr(m), self.expr(s)),
             Dist::Beta(a, b) => format!("beta({a:?}, {b:?})"),
             Dist::Poisson(r) => format!("poisson({})", self.expr(r)),
+            Dist::Flat => "flat()".into(),
         }
     }
 

@@ -22,7 +22,7 @@ use super::program_kernel::{
 };
 use crate::calls::error::fail;
 use crate::calls::formula::Moved;
-use crate::kernel::{Outcome, StepContext, accepts, recoverable};
+use crate::kernel::{Outcome, StepContext, accept_or_reject, recoverable};
 use nalgebra::DMatrix;
 use pcadlang_engine::lang::error::RunError;
 use pcadlang_engine::lang::value::Value;
@@ -110,22 +110,18 @@ impl ProgramKernel {
         let forth = self.play(trace, at, AuxiliaryValues::Drawn(&mut rng), none(aside))?;
         let forth_map = mapped(&forth, trace);
         let log_jacobian = self.log_jacobian((trace, aside), at, &forth, &forth_map)?;
-        let (mut changes, mut undo) = (Vec::new(), Vec::new());
+        let mut changes = Vec::new();
         for m in &forth_map {
             let Some((address, t)) = &m.choice else { continue };
-            let (Some(new), Some(old)) = (m.new.to_datum(), trace.stored(*t)) else {
+            let Some(new) = m.new.to_datum() else {
                 return Err(self.fault(format!("{address} cannot become {}", m.new.type_name())));
             };
             if has_nan(&new) {
                 return Err(self.fault(format!("the new value of {address} is not a number")));
             }
             changes.push((*t, Change::Set(new)));
-            undo.push((*t, Change::Set(old)));
         }
         let (old, volume) = (values(trace, &forth.all), log_volume(trace, &forth.all));
-        undo.extend(
-            forth.all.iter().filter_map(|p| Some((p.target, Change::Set(trace.stored(p.target)?)))),
-        );
         let (new, proposed) = sampled(&forth.all, &mut rng);
         changes.extend(proposed);
         let Some(w) = recoverable(trace.propose(&changes, at.draws(0)))? else {
@@ -135,8 +131,6 @@ impl ProgramKernel {
             trace.rollback();
             return Ok(Outcome::one(false));
         }
-        let removed = trace.removed();
-        trace.commit();
         let auxiliaries: Vec<Value> =
             forth_map.iter().filter(|m| m.choice.is_none()).map(|m| m.new.clone()).collect();
         let back =
@@ -157,14 +151,12 @@ impl ProgramKernel {
         // If the reverse density is zero, the move is rejected whatever the map does
         // there.
         let wrong = wrong.filter(|_| log_back > f64::NEG_INFINITY);
-        if wrong.is_none() && back.is_ok() && accepts(ratio, &mut rng) {
-            return Ok(Outcome::one(true));
-        }
-        trace.propose_constrained(&undo, &removed, at.draws(1))?;
-        trace.commit();
         match (wrong, back) {
-            (Some(e), _) | (None, Err(e)) => Err(e),
-            _ => Ok(Outcome::one(false)),
+            (Some(e), _) | (None, Err(e)) => {
+                trace.rollback();
+                Err(e)
+            }
+            _ => accept_or_reject(trace, at, ratio, &mut rng),
         }
     }
 

@@ -405,7 +405,10 @@ impl MaskOf {
     }
 
     fn rendered(&self) -> Vec<bool> {
-        self.view.depth(self.size).mask().collect()
+        let frame = self.view.depth(self.size);
+        let mut covered = vec![false; frame.depth.len()];
+        covered.iter_mut().zip(&frame.depth).for_each(|(c, depth)| *c = depth.is_finite());
+        covered
     }
 }
 

@@ -194,7 +194,9 @@ impl View {
             if change.is_some() {
                 return Arc::new(self.canvas.contours(solid, &camera));
             }
-            let depth = pictures.with_depth().cloned().or_else(|| self.depth_read(size));
+            // A surface of revolution needs no depth for its contours.
+            let read = || solid.revolution().map_or_else(|| self.depth_read(size), |_| None);
+            let depth = pictures.with_depth().cloned().or_else(read);
             Arc::new(match depth {
                 Some(frame) => Contours::with_depth(solid, &camera, &frame.depth),
                 None => Contours::of(solid, &camera),

@@ -218,7 +218,7 @@ impl ContourRatio {
     fn count(&self, elements: &ContourSlice<'_>, sign: i64, scratch: &mut Scratch) {
         let samples = self.grid.width as usize * self.grid.height as usize;
         // Integer sums are exact: a sum of individually rounded terms does not depend on
-        // their order.
+        // their order. A term is what one element gives to a group, or to none.
         let (mut total, mut length) = (scratch.total, scratch.length);
         for e in elements.in_view() {
             let weight = (f64::from(e.length * e.weight) * self.percent).min(1e4);
@@ -226,18 +226,28 @@ impl ContourRatio {
             let (low, high, f) = channels_of(e.tx, e.ty);
             let corners = self.grid.corners(e.x, e.y);
             let shares = corners.weights();
+            // Neighbouring samples mostly belong to one group.
+            let (mut unmatched, mut group, mut given) = (0.0, NO_GROUP, [0.0; 2]);
             for (k, part) in [(low, 1.0 - f), (high, f)] {
+                let Some(channel) = self.cells.get(k * samples..(k + 1) * samples) else {
+                    continue;
+                };
                 for (&at, share) in corners.at.iter().zip(shares) {
-                    let Some(cell) = self.cells.get(k * samples + at) else { continue };
+                    let Some(cell) = channel.get(at) else { continue };
                     let length = weight * f64::from(part * share);
+                    let score = length * f64::from(cell.score);
                     if cell.group == NO_GROUP {
-                        total = total
-                            .saturating_add(sign * (length * f64::from(cell.score) * FIXED) as i64);
+                        unmatched += score;
+                    } else if cell.group == group {
+                        given = [given[0] + length, given[1] + score];
                     } else {
-                        scratch.assign(cell.group, length, length * f64::from(cell.score), sign);
+                        scratch.assign(group, given, sign);
+                        (group, given) = (cell.group, [length, score]);
                     }
                 }
             }
+            scratch.assign(group, given, sign);
+            total = total.saturating_add(sign * (unmatched * FIXED) as i64);
         }
         (scratch.total, scratch.length) = (total, length);
     }
@@ -420,9 +430,9 @@ impl Scratch {
     }
 
     /// Adds (`sign` 1) or removes (-1) an assignment: a length of contour in percent and
-    /// its unscaled score (length times log ratio).
+    /// its unscaled score (length times log ratio). A group that does not exist takes none.
     #[inline]
-    pub(super) fn assign(&mut self, group: u32, length: f64, score: f64, sign: i64) {
+    pub(super) fn assign(&mut self, group: u32, [length, score]: [f64; 2], sign: i64) {
         if let Some(assign) = self.assignments.get_mut(group as usize) {
             if !assign.open {
                 if self.marked {

@@ -8,6 +8,7 @@ use super::pictures::palette::palette_entries;
 use super::pictures::photo::resize_rows;
 use super::pictures::photo::{Limits, decode_dynamic, is_png};
 use image::DynamicImage;
+use pcadlang_numerics::num::simd::vectorised;
 use pcadlang_numerics::rng::Stream;
 
 /// A mask, true on the object. `data` has `width * height` entries in row-major order.
@@ -207,18 +208,18 @@ impl MaskLikelihood {
     ) -> Result<f64, VisionError> {
         self.check(rendered.len(), width, height)?;
         // In pieces whose counts fit into bytes, so that it vectorises.
-        let pieces = || rendered.chunks(255).zip(self.observed.data.chunks(255));
-        let count = |of: fn(bool, bool) -> bool| -> u64 {
+        let count = |of: fn(bool, bool) -> bool| -> usize {
             let one = |(r, o): (&[bool], &[bool])| {
                 let count = |n: u8, (r, o): (&bool, &bool)| n + u8::from(of(*r, *o));
-                u64::from(r.iter().zip(o).fold(0, count))
+                usize::from(r.iter().zip(o).fold(0, count))
             };
-            pieces().map(one).sum()
+            rendered.chunks(255).zip(self.observed.data.chunks(255)).map(one).sum()
         };
-        let counts = [
-            [count(|r, o| !r & !o), count(|r, o| !r & o)],
-            [count(|r, o| r & !o), count(|r, o| r & o)],
-        ];
+        let (drawn, seen, both) = vectorised(
+            #[inline(always)]
+            || (count(|r, _| r), count(|_, o| o), count(|r, o| r & o)),
+        );
+        let counts = [[rendered.len() + both - drawn - seen, seen - both], [drawn - both, both]];
         Ok(counts[1][1] as f64 * libm::log1p(-self.eps_in)
             + counts[1][0] as f64 * libm::log(self.eps_in)
             + counts[0][1] as f64 * libm::log(self.eps_out)

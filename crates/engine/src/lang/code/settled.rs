@@ -76,9 +76,9 @@ fn follow(code: &Code, block: BlockId, op: &Op, open: &mut Vec<Part>) -> bool {
     op.operands(|o| operand(code, block, o, open));
     let mut inside = |b: &BlockId| open.push(Part::Block(*b));
     match op {
-        Op::Closure(b)
-        | Op::For { body: b, .. }
-        | Op::Call { callee: Callee::Static(b), .. } => inside(b),
+        Op::Closure(b) | Op::For { body: b, .. } | Op::Call { callee: Callee::Static(b), .. } => {
+            inside(b)
+        }
         Op::If { then, otherwise, .. } => [then, otherwise].into_iter().for_each(inside),
         Op::Select { then, otherwise, .. } => {
             [then, otherwise].into_iter().for_each(|o| operand(code, block, *o, open));

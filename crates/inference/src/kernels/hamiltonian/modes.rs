@@ -11,9 +11,7 @@ use super::ascent::{Past, ascend};
 use super::laplace::Laplace;
 use super::memory::Memory;
 use super::system::System;
-use crate::kernel::{
-    Kernel, Outcome, Registered, SiteSelection, StepContext, accept_or_reject, recoverable,
-};
+use crate::kernel::{Kernel, Outcome, Registered, SiteSelection, StepContext, decide, recoverable};
 use crate::kernels::row::{KernelRow, SEL, Type, int, number, opt};
 use crate::state::{StateError, pack, unpack};
 use pcadlang_engine::trace::{Change, Constraint, Selector, Target, Trace, TraceResult};
@@ -488,10 +486,6 @@ impl Kernel for Modes {
             found.log_density(&here.discrete, &here.y) - found.log_density(&mode.discrete, &y);
         let ratio = at.tempered(&w) + w.log_jacobian - here.log_jacobian + ways;
         // If no mode leads to a state, there is no reverse move.
-        Ok(accept_or_reject(
-            trace,
-            if ratio.is_nan() { f64::NEG_INFINITY } else { ratio },
-            &mut rng,
-        ))
+        Ok(decide(trace, ratio, &mut rng))
     }
 }

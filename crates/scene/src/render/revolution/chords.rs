@@ -177,11 +177,11 @@ pub(super) fn reach(
 ) -> f64 {
     let ends = surface.spans().get(span as usize).and_then(|s| surface.ends(s));
     let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
-    let length = libm::hypot(dx, dy);
-    if length < 0.02 {
+    let square = dx * dx + dy * dy;
+    if square < 0.02 * 0.02 {
         return 0.0;
     }
-    let steep = (to[2] - from[2]) / (length * length);
+    let steep = (to[2] - from[2]) / square;
     let mut most = 0.0f64;
     for ring in ends.into_iter().flatten() {
         let p = glam::DVec3::new(ring.r * angle[0], ring.y, ring.r * angle[1]);

@@ -282,7 +282,7 @@ impl Drawer<'_> {
     fn slack(&self, sample: usize, chords: &Chords, i: usize, side: usize) -> f64 {
         let at = |list: &Vec<f64>| list.get(sample).copied().unwrap_or(0.0);
         let [x, _, z] = self.samples.points.each_ref().map(at);
-        let r = libm::hypot(x, z);
+        let r = (x * x + z * z).sqrt();
         let sign = if side == 0 { 1.0 } else { -1.0 };
         let angle = if r > 0.0 { [x / r, sign * z / r] } else { [1.0, 0.0] };
         let span = self.samples.spans.get(sample).copied().unwrap_or(LAST);

@@ -32,105 +32,68 @@ pub(super) fn log_brightness(picture: &LinearImage) -> Vec<f32> {
     picture.rgb.iter().map(log).collect()
 }
 
-/// The variables of each pixel of a run, from whether it counts, its normal and its
-/// brightness: the constant, the terms, brightness.
-#[inline(always)]
-fn columns(
-    one: [f64; RUN],
-    [x, y, z]: [[f64; RUN]; 3],
-    brightness: [f64; RUN],
-) -> [[f64; RUN]; ALL] {
-    let product = |a: &[f64; RUN], b: &[f64; RUN]| std::array::from_fn(|i| a[i] * b[i]);
-    let difference = std::array::from_fn(|i| x[i] * x[i] - y[i] * y[i]);
-    [one, x, y, z, product(&x, &y), product(&x, &z), product(&y, &z), difference, brightness]
-}
-
 /// Returns the log ratio of the marginal likelihoods of the brightness of the pixels
 /// whose group is not 0: linear in functions of the normal versus constant. It is 0 with
 /// fewer than two pixels. Pixels whose normal or brightness is not finite are ignored.
 pub(super) fn log_ratio(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32]) -> f64 {
-    let mut sum = NONE;
-    let chunks = (groups.chunks(RUN * RUNS), normals.chunks(RUN * RUNS));
-    for ((groups, normals), brightness) in chunks.0.zip(chunks.1).zip(brightness.chunks(RUN * RUNS))
-    {
-        let mut of_runs = NONE;
-        let runs = groups.chunks(RUN).zip(normals.chunks(RUN)).zip(brightness.chunks(RUN));
-        for ((groups, normals), brightness) in runs {
-            // Most of a picture is background.
-            if any(groups) {
-                add(&mut of_runs, &products(groups, normals, brightness));
-            }
-        }
-        add(&mut sum, &of_runs);
-    }
-    from_products(&sum)
-}
-
-/// Number of pixels of a run, and of runs whose sums are added before all others. They fix
-/// the order of all additions, so that a changed pixel changes few sums.
-const RUN: usize = 32;
-const RUNS: usize = 32;
-/// Number of independent partial sums of a run. It is fixed, so that the result does not
-/// depend on the machine.
-const LANES: usize = 8;
-
-/// Sums over pixels of the products of (1, terms, brightness); only those on and above the
-/// diagonal are used.
-type Products = [[f64; ALL]; ALL];
-
-/// The sums over no pixels.
-const NONE: Products = [[0.0; ALL]; ALL];
-
-#[inline(always)]
-fn any(groups: &[u8]) -> bool {
-    groups.iter().fold(0, |any, g| any | g) != 0
-}
-
-fn add(to: &mut Products, from: &Products) {
-    vectorised(
-        #[inline(always)]
-        || {
-            let lists = to.as_flattened_mut().iter_mut().zip(from.as_flattened());
-            lists.for_each(|(to, from)| *to += from);
-        },
-    );
-}
-
-/// The sums over the pixels of a run.
-fn products(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32]) -> Products {
-    let mut sums = NONE;
+    let mut sums = [[[0.0; LANES]; ALL]; ALL];
     vectorised(
         #[inline(always)]
         || {
             // The pixels that count, side by side.
-            let (mut numbers, mut count) = ([[0.0f32; RUN]; 4], 0);
-            for ((g, n), b) in groups.iter().zip(normals).zip(brightness).take(RUN) {
-                let place = count & (RUN - 1);
-                [numbers[0][place], numbers[1][place], numbers[2][place]] = *n;
-                numbers[3][place] = *b;
-                count += usize::from(*g > 0 && (n[0] + n[1] + n[2] + b).is_finite());
-            }
-            let there = |list: &[f32; RUN]| -> [f64; RUN] {
-                std::array::from_fn(|i| if i < count { f64::from(list[i]) } else { 0.0 })
-            };
-            let [x, y, z, brightness] = numbers.each_ref().map(there);
-            let columns: [[f64; RUN]; ALL] = columns(there(&[1.0; RUN]), [x, y, z], brightness);
-            let filled = count.div_ceil(LANES);
-            for i in 0..ALL {
-                for j in i..ALL {
-                    let mut lanes = [0.0; LANES];
-                    let lists = columns[i].as_chunks::<LANES>().0.iter();
-                    for (x, y) in lists.zip(columns[j].as_chunks::<LANES>().0).take(filled) {
-                        for (sum, (x, y)) in lanes.iter_mut().zip(x.iter().zip(y)) {
-                            *sum += x * y;
-                        }
+            let (mut block, mut count) = ([[0.0; BLOCK]; 4], 0);
+            let lists = groups.chunks(BLOCK).zip(normals.chunks(BLOCK));
+            for ((groups, normals), brightness) in lists.zip(brightness.chunks(BLOCK)) {
+                // Most of a picture is background.
+                if groups.iter().fold(0, |any, g| any | g) == 0 {
+                    continue;
+                }
+                for ((g, n), b) in groups.iter().zip(normals).zip(brightness) {
+                    let place = count % BLOCK;
+                    [block[0][place], block[1][place], block[2][place]] = *n;
+                    block[3][place] = *b;
+                    count += usize::from(*g > 0 && (n[0] + n[1] + n[2] + b).is_finite());
+                    if count == BLOCK {
+                        add(&mut sums, &block, BLOCK);
+                        count = 0;
                     }
-                    sums[i][j] = lanes.iter().sum();
                 }
             }
+            block.iter_mut().for_each(|list| list[count..].fill(0.0));
+            add(&mut sums, &block, count);
         },
     );
-    sums
+    from_products(&sums.map(|row| row.map(|lanes| lanes.iter().sum())))
+}
+
+/// Number of pixels whose products are added at a time.
+const BLOCK: usize = 32;
+/// Number of independent partial sums. It is fixed, so that the result does not depend on the
+/// machine.
+const LANES: usize = 8;
+
+/// Adds the products of (1, terms, brightness) of the first `count` of some pixels, only those on
+/// and above the diagonal. `block` has their normals and brightness, and zeros behind them.
+#[inline(always)]
+fn add(sums: &mut [[[f64; LANES]; ALL]; ALL], block: &[[f32; BLOCK]; 4], count: usize) {
+    let mut columns = [[0.0; BLOCK]; ALL];
+    for i in 0..BLOCK {
+        let [x, y, z, brightness] = [0, 1, 2, 3].map(|k| f64::from(block[k][i]));
+        columns[0][i] = if i < count { 1.0 } else { 0.0 };
+        (columns[1][i], columns[2][i], columns[3][i]) = (x, y, z);
+        (columns[4][i], columns[5][i], columns[6][i]) = (x * y, x * z, y * z);
+        (columns[7][i], columns[8][i]) = (x * x - y * y, brightness);
+    }
+    for i in 0..ALL {
+        for j in i..ALL {
+            let lanes = &mut sums[i][j];
+            for at in (0..BLOCK).step_by(LANES) {
+                for (l, lane) in lanes.iter_mut().enumerate() {
+                    *lane += columns[i][at + l] * columns[j][at + l];
+                }
+            }
+        }
+    }
 }
 
 /// Computes the log ratio from sums of products of (1, terms, brightness), of which those
