@@ -6,6 +6,7 @@ use super::found_objects::found;
 use pcadlang_detectors::boxes::{contains, overlap, sides};
 use pcadlang_detectors::objects::{FoundObject, VIEWS};
 use pcadlang_engine::lang::error::Fault;
+use pcadlang_numerics::platform::threads::map_side_by_side;
 use pcadlang_scene::vision::candidates::{Axis, Candidate, CandidateOptions, candidates, enclosed};
 use pcadlang_scene::vision::segmentation::{Guess, Method, from_mask, guesses};
 use pcadlang_scene::vision::{Hint, Mask, Photo};
@@ -215,9 +216,12 @@ pub(super) fn places(
     }
     let boxes = boxes(photo, &found(image, &VIEWS)?, hint);
     let candidates = search()?;
+    let within = |o: &Seen| Hint { bounds: Some(sized(o.bounds)), ..hint.clone() };
+    // Each takes as long as all the rest.
+    map_side_by_side(&boxes, |(o, _)| image.guesses(photo, &within(o)).is_ok());
     let seen = boxes.iter().map(|(o, weight)| {
         let bounds = Some(sized(o.bounds));
-        let all = image.guesses(photo, &Hint { bounds, ..hint.clone() })?;
+        let all = image.guesses(photo, &within(o))?;
         Ok(Place::guessed(o.class, *weight, bounds, &all).with_regions(&candidates, size))
     });
     let mut all: Vec<Place> = seen.collect::<Result<_, Fault>>()?;
