@@ -4,6 +4,8 @@
 //! which is not small where a scale is smaller; and other than in nutpie, forces do
 //! not count (docs/measurements/speed.md says what both cost).
 
+use super::curvature::Window;
+use super::metric::{Directions, Metric};
 use super::point::Point;
 use super::system::System;
 use crate::state::{StateError, holds};
@@ -41,11 +43,13 @@ pub(super) struct Adaptation {
     target: f64,
     /// The coordinates of the metric: addresses and their numbers of coordinates.
     signature: Vec<(u64, usize)>,
-    pub inverse_mass: Vec<f64>,
-    /// By address, the inverse masses from the last windows. Choices that disappear and
+    pub metric: Metric,
+    /// By address, the variances from the last windows. Choices that disappear and
     /// reappear get theirs again, so that after warm-up the metric is a function of the
     /// set of choices.
     learnt: BTreeMap<u64, Vec<f64>>,
+    /// The directions that the last window stretched, for the coordinates for which they are.
+    correlated: (Vec<(u64, usize)>, Directions),
     /// A given step size; adapted if `None`.
     fixed: Option<f64>,
     step: f64,
@@ -59,6 +63,8 @@ pub(super) struct Adaptation {
     /// The states of this window, by address; choices that disappear and reappear
     /// continue to be counted.
     states: BTreeMap<u64, Moments>,
+    /// The states and forces of this window since these choices are the ones that move.
+    together: Window,
 }
 
 /// Means and sums of squares of a choice's coordinates (Welford 1962).
@@ -101,8 +107,9 @@ impl Adaptation {
         Adaptation {
             target,
             signature: Vec::new(),
-            inverse_mass: Vec::new(),
+            metric: Metric::default(),
             learnt: BTreeMap::new(),
+            correlated: Default::default(),
             fixed,
             step: 0.0,
             averaged: 0.0,
@@ -113,6 +120,7 @@ impl Adaptation {
             window_end: BURN + WINDOW,
             window: WINDOW,
             states: BTreeMap::new(),
+            together: Window::default(),
         }
     }
 
@@ -121,10 +129,14 @@ impl Adaptation {
     /// # Errors
     /// If the sizes of its parts are inconsistent.
     pub fn take_up(&mut self, read: Adaptation) -> Result<(), StateError> {
-        let n = read.inverse_mass.len();
+        let n = read.metric.dimensions();
         let sizes = read.signature.iter().try_fold(0usize, |sum, s| sum.checked_add(s.1));
         let whole = |m: &Moments| m.mean.len() == m.square.len();
-        holds(sizes == Some(n) && read.states.values().all(whole), "a step size and metric")?;
+        let (known, directions) = &read.correlated;
+        directions.check(known.iter().fold(0, |n, s| n.saturating_add(s.1)))?;
+        read.metric.stretched.check(n)?;
+        let whole = read.together.is_whole() && read.states.values().all(whole);
+        holds(sizes == Some(n) && whole, "a step size and metric")?;
         *self = Adaptation { target: self.target, fixed: self.fixed, ..read };
         Ok(())
     }
@@ -141,7 +153,8 @@ impl Adaptation {
             // Step size and windows continue across changes of structure: if it changed
             // every few steps they would otherwise never adapt.
             self.signature = system.signature().to_vec();
-            self.inverse_mass = self.metric();
+            self.metric = self.metric();
+            self.together = Window::default();
         }
         if let Some(step) = self.fixed {
             return Ok(step);
@@ -158,8 +171,9 @@ impl Adaptation {
         self.fixed.or(Some(learnt)).filter(|s| *s > 0.0)
     }
 
-    /// Adapts to a transition: its mean acceptance probability and its end point.
-    pub fn learn(&mut self, acceptance: f64, y: &[f64]) {
+    /// Adapts to a transition: its mean acceptance probability, its end point and the force
+    /// there.
+    pub fn learn(&mut self, acceptance: f64, y: &[f64], force: &[f64]) {
         self.rounds += 1.0;
         let weight = 1.0 / (self.rounds + T0);
         let off = self.target - if acceptance.is_nan() { 0.0 } else { acceptance.min(1.0) };
@@ -182,6 +196,7 @@ impl Adaptation {
                 self.states.entry(*hash).or_default().add(own);
                 rest = others;
             }
+            self.together.add(y, force);
         }
         if self.seen == self.window_end {
             let log_longer = self.close();
@@ -205,19 +220,31 @@ impl Adaptation {
                 self.learnt.insert(hash, masses);
             }
         }
+        let variances = self.metric_without_directions();
+        let directions = std::mem::take(&mut self.together).directions(&variances.scales);
+        self.correlated = (self.signature.clone(), directions);
         let metric = self.metric();
-        let before = std::mem::replace(&mut self.inverse_mass, metric);
-        let pairs = before.iter().zip(&self.inverse_mass);
-        let sum: f64 = pairs.map(|(old, new)| 0.5 * (libm::log(*old) - libm::log(*new))).sum();
-        sum / before.len().max(1) as f64
+        let before = std::mem::replace(&mut self.metric, metric);
+        (before.log_size() - self.metric.log_size()) / before.dimensions().max(1) as f64
     }
 
-    /// The inverse masses of the present choices: those of previous windows, or 1 for
-    /// choices without.
-    fn metric(&self) -> Vec<f64> {
+    /// The metric of the present choices: the scales of previous windows, or 1 for choices
+    /// without, and directions if the last one was about the same choices.
+    fn metric(&self) -> Metric {
+        let mut metric = self.metric_without_directions();
+        if self.correlated.0 == self.signature {
+            metric.stretched = self.correlated.1.clone();
+        }
+        metric
+    }
+
+    fn metric_without_directions(&self) -> Metric {
         let known =
             |(hash, n): &(u64, usize)| self.learnt.get(hash).filter(|m| m.len() == *n).cloned();
-        self.signature.iter().flat_map(|s| known(s).unwrap_or_else(|| vec![1.0; s.1])).collect()
+        let variances =
+            self.signature.iter().flat_map(|s| known(s).unwrap_or_else(|| vec![1.0; s.1]));
+        let scales = variances.map(f64::sqrt).collect();
+        Metric { scales, stretched: Directions::default() }
     }
 
     /// Doubles or halves the step size until the acceptance probability of one leapfrog
@@ -233,12 +260,10 @@ impl Adaptation {
             if direction > 0.0 && round >= DOUBLINGS {
                 break;
             }
-            let from = system.launch(here, &self.inverse_mass, rng);
-            let start = from.kinetic(&self.inverse_mass);
-            let ratio = match system.leapfrog(&from, step, &self.inverse_mass)? {
-                Some(to) => {
-                    to.log_density - here.log_density + start - to.kinetic(&self.inverse_mass)
-                }
+            let from = system.launch(here, &self.metric, rng);
+            let start = from.kinetic();
+            let ratio = match system.leapfrog(&from, step, &self.metric)? {
+                Some(to) => to.log_density - here.log_density + start - to.kinetic(),
                 None => f64::NEG_INFINITY,
             };
             let up = if ratio > libm::log(0.8) { 1.0 } else { -1.0 };
@@ -288,16 +313,16 @@ mod tests {
     fn a_step_stays_as_long_as_it_was_when_the_metric_changes() {
         let mut adaptation = Adaptation::new(0.8, None);
         adaptation.signature = vec![(7, 1)];
-        adaptation.inverse_mass = vec![1.0];
+        adaptation.metric = Metric::plain(1);
         adaptation.step = 1e-30;
         adaptation.averaged = 1e-30;
         adaptation.mean_log = libm::log(1e-30);
         for i in 0..BURN + WINDOW {
-            adaptation.learn(0.8, &[1e-30 * f64::from(i % 5)]);
+            adaptation.learn(0.8, &[1e-30 * f64::from(i % 5)], &[0.0]);
         }
         // It is to be searched for, from about where it was.
         assert_eq!(adaptation.step, 0.0);
-        let length = adaptation.averaged * adaptation.inverse_mass[0].sqrt();
+        let length = adaptation.averaged * adaptation.metric.scales[0];
         assert!((length / 1e-30 - 1.0).abs() < 1e-6, "{length}");
     }
 }
