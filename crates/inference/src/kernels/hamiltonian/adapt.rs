@@ -5,7 +5,7 @@
 //! not count (docs/measurements/speed.md says what both cost).
 
 use super::curvature::Window;
-use super::metric::{Directions, Metric};
+use super::metric::{Metric, Mixing};
 use super::point::Point;
 use super::system::System;
 use crate::state::{StateError, holds};
@@ -48,8 +48,8 @@ pub(super) struct Adaptation {
     /// reappear get theirs again, so that after warm-up the metric is a function of the
     /// set of choices.
     learnt: BTreeMap<u64, Vec<f64>>,
-    /// The directions that the last window stretched, for the coordinates for which they are.
-    correlated: (Vec<(u64, usize)>, Directions),
+    /// The map that the last window gave, and for which coordinates.
+    mixing: (Vec<(u64, usize)>, Mixing),
     /// A given step size; adapted if `None`.
     fixed: Option<f64>,
     step: f64,
@@ -109,7 +109,7 @@ impl Adaptation {
             signature: Vec::new(),
             metric: Metric::default(),
             learnt: BTreeMap::new(),
-            correlated: Default::default(),
+            mixing: Default::default(),
             fixed,
             step: 0.0,
             averaged: 0.0,
@@ -132,9 +132,11 @@ impl Adaptation {
         let n = read.metric.dimensions();
         let sizes = read.signature.iter().try_fold(0usize, |sum, s| sum.checked_add(s.1));
         let whole = |m: &Moments| m.mean.len() == m.square.len();
-        let (known, directions) = &read.correlated;
-        directions.check(known.iter().fold(0, |n, s| n.saturating_add(s.1)))?;
-        read.metric.stretched.check(n)?;
+        let (known, mixing) = &read.mixing;
+        let coordinates = known.iter().fold(0, |n: usize, s| n.saturating_add(s.1));
+        let mixed = [0, coordinates.saturating_mul(coordinates)].contains(&mixing.columns.len());
+        holds(mixed, "a metric")?;
+        read.metric.check()?;
         let whole = read.together.is_whole() && read.states.values().all(whole);
         holds(sizes == Some(n) && whole, "a step size and metric")?;
         *self = Adaptation { target: self.target, fixed: self.fixed, ..read };
@@ -220,31 +222,28 @@ impl Adaptation {
                 self.learnt.insert(hash, masses);
             }
         }
-        let variances = self.metric_without_directions();
-        let directions = std::mem::take(&mut self.together).directions(&variances.scales);
-        self.correlated = (self.signature.clone(), directions);
+        let mixing = std::mem::take(&mut self.together).mixing(&self.scales());
+        self.mixing = (self.signature.clone(), mixing);
         let metric = self.metric();
         let before = std::mem::replace(&mut self.metric, metric);
-        (before.log_size() - self.metric.log_size()) / before.dimensions().max(1) as f64
+        (before.log_size - self.metric.log_size) / before.dimensions().max(1) as f64
     }
 
-    /// The metric of the present choices: the scales of previous windows, or 1 for choices
-    /// without, and directions if the last one was about the same choices.
+    /// The metric of the present choices, with the map of the last window if that was about
+    /// the same choices.
     fn metric(&self) -> Metric {
-        let mut metric = self.metric_without_directions();
-        if self.correlated.0 == self.signature {
-            metric.stretched = self.correlated.1.clone();
-        }
-        metric
+        let (same, nothing) = (self.mixing.0 == self.signature, Mixing::default());
+        Metric::new(self.scales(), if same { &self.mixing.1 } else { &nothing })
     }
 
-    fn metric_without_directions(&self) -> Metric {
+    /// The standard deviations of the present choices: those of previous windows, or 1 for
+    /// choices without.
+    fn scales(&self) -> Vec<f64> {
         let known =
             |(hash, n): &(u64, usize)| self.learnt.get(hash).filter(|m| m.len() == *n).cloned();
         let variances =
             self.signature.iter().flat_map(|s| known(s).unwrap_or_else(|| vec![1.0; s.1]));
-        let scales = variances.map(f64::sqrt).collect();
-        Metric { scales, stretched: Directions::default() }
+        variances.map(f64::sqrt).collect()
     }
 
     /// Doubles or halves the step size until the acceptance probability of one leapfrog
@@ -313,7 +312,7 @@ mod tests {
     fn a_step_stays_as_long_as_it_was_when_the_metric_changes() {
         let mut adaptation = Adaptation::new(0.8, None);
         adaptation.signature = vec![(7, 1)];
-        adaptation.metric = Metric::plain(1);
+        adaptation.metric = Metric::new(vec![1.0], &Mixing::default());
         adaptation.step = 1e-30;
         adaptation.averaged = 1e-30;
         adaptation.mean_log = libm::log(1e-30);
