@@ -1,8 +1,8 @@
 //! Warm-up of Hamiltonian kernels: dual averaging of the step size (Hoffman & Gelman
-//! 2014, section 3.2), and a diagonal metric from the variances over windows that double
-//! in length, as in Stan. Other than in Stan, the variances are not shrunk towards 1e-3,
-//! which is not small where a scale is smaller; and other than in nutpie, forces do
-//! not count (docs/measurements/speed.md says what both cost).
+//! 2014, section 3.2), and a metric from windows that double in length, as in Stan: scales
+//! from variances, and a map that makes up for correlations (`super::curvature`). Other than
+//! in Stan, variances are not shrunk towards 1e-3, which is not small where a scale is
+//! smaller. docs/measurements/speed.md says what others cost.
 
 use super::curvature::Window;
 use super::metric::{Metric, Mixing};
