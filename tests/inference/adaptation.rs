@@ -269,12 +269,12 @@ fn a_metric_depends_on_nothing_but_the_choices_there_are() {
         let mut seen: Vec<(Value, Vec<Value>)> = Vec::new();
         for (_, states) in all.iter().filter(|(step, _)| *step >= 400) {
             let adaptation = read(&states[0]).as_array().unwrap()[0].clone();
-            let learnt = ["inverse_mass", "learnt", "step", "averaged"]
+            let learnt = ["metric", "learnt", "mixing", "step", "averaged"]
                 .map(|f| field(&adaptation, f).clone())
                 .to_vec();
-            let mass: Vec<f64> =
-                learnt[0].as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect();
-            assert!(mass.iter().all(|m| m.is_finite() && *m > 0.0), "{kernel}: {mass:?}");
+            let scales = field(&learnt[0], "scales").as_array().unwrap();
+            let scales: Vec<f64> = scales.iter().map(|x| x.as_float().unwrap()).collect();
+            assert!(scales.iter().all(|m| m.is_finite() && *m > 0.0), "{kernel}: {scales:?}");
             let choices = field(&adaptation, "signature").clone();
             match seen.iter().find(|(other, _)| *other == choices) {
                 Some((_, before)) => assert_eq!(*before, learnt, "{kernel}"),

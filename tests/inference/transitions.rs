@@ -153,8 +153,14 @@ fn slices_of_two_modes() {
 const GAUSSIAN: &str = "assume a ~ iid(normal(0, 1), 5); assume b ~ normal(0, 8); observe normal(0 * (sum(a) + b), 1) = 0;";
 
 /// Returns a kernel whose adapted step size and inverse masses are replaced by these:
-/// those of `a`, and that of `b`.
-fn set<K: Kernel>(mut kernel: K, trace: &mut Trace, step: f64, masses: ([f64; 5], f64)) -> K {
+/// those of `a`, and that of `b`; if `mixed`, after a map of all coordinates.
+fn set<K: Kernel>(
+    mut kernel: K,
+    trace: &mut Trace,
+    step: f64,
+    masses: ([f64; 5], f64),
+    mixed: bool,
+) -> K {
     put(trace, &[("@a", Value::array(vec![0.1; 5])), ("@b", 0.2.into())]);
     kernel.step(trace, &StepContext::new(1, 0, 0)).unwrap();
     let mut state: Cbor = ciborium::from_reader(&kernel.save(trace)[..]).unwrap();
@@ -180,16 +186,33 @@ fn set<K: Kernel>(mut kernel: K, trace: &mut Trace, step: f64, masses: ([f64; 5]
                 rest.by_ref().take(if sizes.len() == 2 { 5 } else { 1 }).collect()
             }
         })
-        .map(Cbor::Float)
+        .map(|m: f64| Cbor::Float(m.sqrt()))
         .collect();
     assert!(masses.len() == 6);
+    let entry = |i: usize, j: usize| f64::from(u8::from(i == j)) + 0.3 * ((i + 2 * j) as f64).sin();
+    let map = |entry: &dyn Fn(usize, usize) -> f64| {
+        let all = (0..36).map(|k| Cbor::Float(entry(k / 6, k % 6)));
+        Cbor::Array(if mixed { all.collect() } else { Vec::new() })
+    };
+    let mut found = 0;
     for (name, value) in adaptation {
         match name.as_text() {
-            Some("inverse_mass") => *value = Cbor::Array(masses.clone()),
+            Some("metric") => {
+                for (name, value) in value.as_map_mut().unwrap() {
+                    match name.as_text().unwrap() {
+                        "scales" => *value = Cbor::Array(masses.clone()),
+                        "columns" => *value = map(&|j, i| entry(i, j)),
+                        "rows" => *value = map(&entry),
+                        _ => continue,
+                    }
+                    found += 1;
+                }
+            }
             Some("step" | "averaged") => *value = Cbor::Float(step),
             _ => {}
         }
     }
+    assert_eq!(found, 3);
     let mut bytes = Vec::new();
     ciborium::into_writer(&state, &mut bytes).unwrap();
     kernel.load(&bytes).unwrap();
@@ -228,23 +251,25 @@ fn gaussian_stays(what: &str, mut kernel: impl Kernel, trace: &mut Trace, count:
 fn places_of_a_trajectory_are_chosen_by_their_weights() {
     let mut t = trace(GAUSSIAN);
     for step in [1.6, 1.8] {
-        let kernel = set(Nuts::new(all(), 8), &mut t, step, ([1.0; 5], 1.0));
+        let kernel = set(Nuts::new(all(), 8), &mut t, step, ([1.0; 5], 1.0), false);
         gaussian_stays(&format!("nuts, step {step}"), kernel, &mut t, 8000);
     }
 }
 
-/// Inverse masses far from 1 and from each other: any metric leaves the density
-/// invariant.
+/// Inverse masses far from 1 and from each other, and a map that mixes coordinates: any
+/// metric leaves the density invariant.
 #[test]
 fn metrics_leave_the_density_as_it_is() {
     let mut t = trace(GAUSSIAN);
     let masses = ([6.0, 0.2, 1.0, 3.0, 0.5], 40.0);
-    let kernel = set(Hmc::new(all(), 3, None), &mut t, 0.5, masses);
-    gaussian_stays("hmc, uneven metric", kernel, &mut t, 4000);
-    let kernel = set(Hmc::new(all(), 1, None), &mut t, 0.5, masses);
-    gaussian_stays("mala, uneven metric", kernel, &mut t, 4000);
-    let kernel = set(Nuts::new(all(), 6), &mut t, 0.5, masses);
-    gaussian_stays("nuts, uneven metric", kernel, &mut t, 2000);
+    for mixed in [false, true] {
+        let kernel = set(Hmc::new(all(), 3, None), &mut t, 0.5, masses, mixed);
+        gaussian_stays(&format!("hmc, uneven metric, {mixed}"), kernel, &mut t, 4000);
+        let kernel = set(Hmc::new(all(), 1, None), &mut t, 0.5, masses, mixed);
+        gaussian_stays(&format!("mala, uneven metric, {mixed}"), kernel, &mut t, 4000);
+        let kernel = set(Nuts::new(all(), 6), &mut t, 0.5, masses, mixed);
+        gaussian_stays(&format!("nuts, uneven metric, {mixed}"), kernel, &mut t, 2000);
+    }
 }
 
 /// Warm-up learns the variance of each number, not its inverse or its root.
@@ -263,10 +288,12 @@ fn metrics_learn_variances() {
         }
         let state: Cbor = ciborium::from_reader(&kernel.save(&t)[..]).unwrap();
         let adaptation = state.as_array().unwrap()[0].as_map().unwrap().clone();
-        let learnt =
-            &adaptation.iter().find(|(k, _)| k.as_text() == Some("inverse_mass")).unwrap().1;
-        let mut learnt: Vec<f64> =
-            learnt.as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect();
+        let field = |map: &[(Cbor, Cbor)], name: &str| {
+            map.iter().find(|(k, _)| k.as_text() == Some(name)).unwrap().1.clone()
+        };
+        let metric = field(&adaptation, "metric").as_map().unwrap().clone();
+        let scales = field(&metric, "scales").as_array().unwrap().clone();
+        let mut learnt: Vec<f64> = scales.iter().map(|x| x.as_float().unwrap().powi(2)).collect();
         // In any order of the choices.
         learnt.sort_by(f64::total_cmp);
         for (found, variance) in learnt.iter().zip([0.0025, 0.09, 2.25]) {

@@ -4,7 +4,8 @@
 //!     cargo run --release -p pcadlang-benches --bin peer -- DATA.json OUT.json MODEL N BUDGET_S SEED
 //!
 //! The models are the programs in `benches/peers`; DATA holds the data sets by model (and
-//! by size, if there are several). BUDGET_S is a time in seconds, or a number of steps
+//! by size, if there are several). A path that ends in `.pcad` is a model, too: its data are
+//! all of DATA, and OUT gets all that it collects, by the default plan if it has none. BUDGET_S is a time in seconds, or a number of steps
 //! after warm-up, as in `20000steps`, to count instructions by the difference of two. OUT
 //! gets the time at which sampling could start, the number of transitions after warm-up,
 //! their processor time on one thread, and the draws.
@@ -79,10 +80,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("usage: peer DATA.json OUT.json MODEL N BUDGET_S SEED".into());
     };
     let data: Json = serde_json::from_str(&std::fs::read_to_string(data)?)?;
-    let (_, text, names) =
-        MODELS.iter().find(|(m, ..)| m == name).ok_or_else(|| format!("no model `{name}`"))?;
+    let own = name.ends_with(".pcad").then(|| std::fs::read_to_string(name)).transpose()?;
+    let (text, names) = match (&own, MODELS.iter().find(|(m, ..)| m == name)) {
+        (Some(text), _) => (&text[..], None),
+        (None, Some((_, text, names))) => (*text, Some(*names)),
+        (None, None) => return Err(format!("no model `{name}`").into()),
+    };
     // Both programs of a model have the same data.
-    let given = &data[name.trim_end_matches("_summed")];
+    let given = if own.is_some() { &data } else { &data[name.trim_end_matches("_summed")] };
     let model = compile(text, given.get(n).unwrap_or(given))?;
     let (time, steps) = match budget.strip_suffix("steps") {
         Some(steps) => (None, Some(steps.parse()?)),
@@ -106,8 +111,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut draws = serde_json::Map::new();
     let collected =
         posterior.scalars().into_iter().filter(|(name, _)| !name.starts_with("log_joint"));
-    for (name, q) in names.iter().zip(collected) {
-        draws.insert((*name).to_owned(), json!([q.1[first + 1..=*last]]));
+    for (i, (collected, values)) in collected.enumerate() {
+        let name = match names {
+            Some(names) => names.get(i).map(|name| (*name).to_owned()),
+            None => Some(collected),
+        };
+        if let Some(name) = name {
+            draws.insert(name, json!([values[first + 1..=*last]]));
+        }
     }
     let result = json!({
         "t_ready": t_ready,

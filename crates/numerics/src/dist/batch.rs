@@ -71,8 +71,8 @@ pub(super) trait Member<const N: usize>:
     fn log_density(&self, x: f64) -> f64;
 
     /// Returns the derivatives with respect to the number (0 if it is discrete) and to
-    /// the parameters.
-    fn slopes(&self, x: f64) -> (f64, [f64; N]);
+    /// the parameters; that of the first parameter only if it is asked for.
+    fn slopes(&self, x: f64, first: bool) -> (f64, [f64; N]);
 }
 
 impl<T, const N: usize> Member<N> for T
@@ -90,8 +90,8 @@ where
     }
 
     #[inline]
-    fn slopes(&self, x: f64) -> (f64, [f64; N]) {
-        let slope = self.slope(x);
+    fn slopes(&self, x: f64, first: bool) -> (f64, [f64; N]) {
+        let slope = if first { self.slope(x) } else { self.slope_without_shape(x) };
         let mut params = [0.0; N];
         params.iter_mut().zip(&slope.params).for_each(|(p, s)| *p = *s);
         (slope.x.unwrap_or(0.0), params)
@@ -141,7 +141,7 @@ impl<T: Member<N>, const N: usize> Component for Members<T, N> {
 
     fn slopes_num(&self, x: f64, params: &mut [f64; 3]) -> f64 {
         let Some((_, d)) = self.0.first() else { return 0.0 };
-        let (by, own) = d.slopes(x);
+        let (by, own) = d.slopes(x, true);
         params.iter_mut().zip(own).for_each(|(p, s)| *p = s);
         by
     }
@@ -165,6 +165,7 @@ impl<T: Member<N>, const N: usize> Members<T, N> {
         all: f64,
     ) {
         let (x, columns) = (rows.x, <&[Column; N]>::try_from(rows.params).ok());
+        let first = columns.and_then(|c| c.first()).is_some_and(|c| c.live);
         let (mut of_x, mut of_params) = (0.0, [0.0; N]);
         for (i, (at, d)) in self.numbers(buffer, rows).enumerate() {
             let weight = weights.map_or(1.0, |from| by[from + i]);
@@ -172,7 +173,7 @@ impl<T: Member<N>, const N: usize> Members<T, N> {
             if weight == 0.0 {
                 continue;
             }
-            let (gx, gp) = d.slopes(at);
+            let (gx, gp) = d.slopes(at, first);
             if x.live {
                 let g = gx * weight;
                 if x.step == 0 { of_x += g } else { by[x.at + i] += g * all }

@@ -51,6 +51,13 @@ pub trait Scalar: Named + fmt::Debug + Send + Sync {
     /// Returns the derivatives of the log density at a point where it is finite.
     fn slope(&self, x: f64) -> Slope;
 
+    /// Returns the derivatives without that with respect to the first parameter, a shape,
+    /// which may be left at 0 where it takes longest.
+    #[inline]
+    fn slope_without_shape(&self, x: f64) -> Slope {
+        self.slope(x)
+    }
+
     /// Returns the log probabilities on both sides of a number, if the family can compute
     /// them.
     fn tails(&self, _x: f64) -> Option<Tails> {

@@ -308,20 +308,30 @@ impl Builder {
         Some(Form::Num(out))
     }
 
-    /// The product of a fixed matrix and a vector.
+    /// The product of a fixed matrix and a vector, or of a vector and a fixed matrix.
     fn matrix(&mut self, args: &[Form]) -> Option<Form> {
-        let [Form::Fixed(Value::List(list)), Form::Array(x, width)] = args else { return None };
-        let rows = self.values.numbers.len();
-        for row in list.iter() {
-            let Value::Array(xs) = row else { return None };
-            self.values.numbers.extend(xs.iter());
-        }
-        if self.values.numbers.len() != rows + list.len() * width {
+        let (list, x, width, by_columns) = match args {
+            [Form::Fixed(Value::List(list)), Form::Array(x, n)] => (list, *x, *n, false),
+            [Form::Array(x, n), Form::Fixed(Value::List(list))] => (list, *x, *n, true),
+            _ => return None,
+        };
+        let row = |row: &Value| if let Value::Array(xs) = row { Some(xs.to_vec()) } else { None };
+        let mut all: Vec<Vec<f64>> = list.iter().map(row).collect::<Option<_>>()?;
+        let columns = all.first().map_or(0, Vec::len);
+        if all.iter().any(|row| row.len() != columns) {
             return None;
         }
-        let out = self.reserve(list.len());
-        self.ops.push(Op::Matrix { rows, x: *x, width: *width, out, n: list.len() });
-        Some(Form::Array(out, list.len()))
+        if by_columns {
+            all = (0..columns).map(|j| all.iter().map(|row| row[j]).collect()).collect();
+        }
+        if all.iter().any(|row| row.len() != width) {
+            return None;
+        }
+        let (rows, n) = (self.values.numbers.len(), all.len());
+        all.iter().for_each(|row| self.values.numbers.extend(row));
+        let out = self.reserve(n);
+        self.ops.push(Op::Matrix { rows, x, width, out, n });
+        Some(Form::Array(out, n))
     }
 
     /// Records an array of these elements.

@@ -1,9 +1,11 @@
 //! Warm-up of Hamiltonian kernels: dual averaging of the step size (Hoffman & Gelman
-//! 2014, section 3.2), and a diagonal metric from the variances over windows that double
-//! in length, as in Stan. Other than in Stan, the variances are not shrunk towards 1e-3,
-//! which is not small where a scale is smaller; and other than in nutpie, forces do
-//! not count (docs/measurements/speed.md says what both cost).
+//! 2014, section 3.2), and a metric from windows that double in length, as in Stan: scales
+//! from variances, and a map that makes up for correlations (`super::curvature`). Other than
+//! in Stan, variances are not shrunk towards 1e-3, which is not small where a scale is
+//! smaller. docs/measurements/speed.md says what others cost.
 
+use super::curvature::Window;
+use super::metric::{Metric, Mixing};
 use super::point::Point;
 use super::system::System;
 use crate::state::{StateError, holds};
@@ -41,11 +43,13 @@ pub(super) struct Adaptation {
     target: f64,
     /// The coordinates of the metric: addresses and their numbers of coordinates.
     signature: Vec<(u64, usize)>,
-    pub inverse_mass: Vec<f64>,
-    /// By address, the inverse masses from the last windows. Choices that disappear and
+    pub metric: Metric,
+    /// By address, the variances from the last windows. Choices that disappear and
     /// reappear get theirs again, so that after warm-up the metric is a function of the
     /// set of choices.
     learnt: BTreeMap<u64, Vec<f64>>,
+    /// The map that the last window gave, and for which coordinates.
+    mixing: (Vec<(u64, usize)>, Mixing),
     /// A given step size; adapted if `None`.
     fixed: Option<f64>,
     step: f64,
@@ -59,6 +63,8 @@ pub(super) struct Adaptation {
     /// The states of this window, by address; choices that disappear and reappear
     /// continue to be counted.
     states: BTreeMap<u64, Moments>,
+    /// The states and forces of this window since these choices are the ones that move.
+    together: Window,
 }
 
 /// Means and sums of squares of a choice's coordinates (Welford 1962).
@@ -101,8 +107,9 @@ impl Adaptation {
         Adaptation {
             target,
             signature: Vec::new(),
-            inverse_mass: Vec::new(),
+            metric: Metric::default(),
             learnt: BTreeMap::new(),
+            mixing: Default::default(),
             fixed,
             step: 0.0,
             averaged: 0.0,
@@ -113,6 +120,7 @@ impl Adaptation {
             window_end: BURN + WINDOW,
             window: WINDOW,
             states: BTreeMap::new(),
+            together: Window::default(),
         }
     }
 
@@ -121,10 +129,16 @@ impl Adaptation {
     /// # Errors
     /// If the sizes of its parts are inconsistent.
     pub fn take_up(&mut self, read: Adaptation) -> Result<(), StateError> {
-        let n = read.inverse_mass.len();
+        let n = read.metric.dimensions();
         let sizes = read.signature.iter().try_fold(0usize, |sum, s| sum.checked_add(s.1));
         let whole = |m: &Moments| m.mean.len() == m.square.len();
-        holds(sizes == Some(n) && read.states.values().all(whole), "a step size and metric")?;
+        let (known, mixing) = &read.mixing;
+        let coordinates = known.iter().fold(0, |n: usize, s| n.saturating_add(s.1));
+        let mixed = [0, coordinates.saturating_mul(coordinates)].contains(&mixing.columns.len());
+        holds(mixed, "a metric")?;
+        read.metric.check()?;
+        let whole = read.together.is_whole() && read.states.values().all(whole);
+        holds(sizes == Some(n) && whole, "a step size and metric")?;
         *self = Adaptation { target: self.target, fixed: self.fixed, ..read };
         Ok(())
     }
@@ -141,7 +155,8 @@ impl Adaptation {
             // Step size and windows continue across changes of structure: if it changed
             // every few steps they would otherwise never adapt.
             self.signature = system.signature().to_vec();
-            self.inverse_mass = self.metric();
+            self.metric = self.metric();
+            self.together = Window::default();
         }
         if let Some(step) = self.fixed {
             return Ok(step);
@@ -158,8 +173,9 @@ impl Adaptation {
         self.fixed.or(Some(learnt)).filter(|s| *s > 0.0)
     }
 
-    /// Adapts to a transition: its mean acceptance probability and its end point.
-    pub fn learn(&mut self, acceptance: f64, y: &[f64]) {
+    /// Adapts to a transition: its mean acceptance probability, its end point and the force
+    /// there.
+    pub fn learn(&mut self, acceptance: f64, y: &[f64], force: &[f64]) {
         self.rounds += 1.0;
         let weight = 1.0 / (self.rounds + T0);
         let off = self.target - if acceptance.is_nan() { 0.0 } else { acceptance.min(1.0) };
@@ -182,6 +198,7 @@ impl Adaptation {
                 self.states.entry(*hash).or_default().add(own);
                 rest = others;
             }
+            self.together.add(y, force);
         }
         if self.seen == self.window_end {
             let log_longer = self.close();
@@ -205,19 +222,28 @@ impl Adaptation {
                 self.learnt.insert(hash, masses);
             }
         }
+        let mixing = std::mem::take(&mut self.together).mixing(&self.scales());
+        self.mixing = (self.signature.clone(), mixing);
         let metric = self.metric();
-        let before = std::mem::replace(&mut self.inverse_mass, metric);
-        let pairs = before.iter().zip(&self.inverse_mass);
-        let sum: f64 = pairs.map(|(old, new)| 0.5 * (libm::log(*old) - libm::log(*new))).sum();
-        sum / before.len().max(1) as f64
+        let before = std::mem::replace(&mut self.metric, metric);
+        (before.log_size - self.metric.log_size) / before.dimensions().max(1) as f64
     }
 
-    /// The inverse masses of the present choices: those of previous windows, or 1 for
+    /// The metric of the present choices, with the map of the last window if that was about
+    /// the same choices.
+    fn metric(&self) -> Metric {
+        let (same, nothing) = (self.mixing.0 == self.signature, Mixing::default());
+        Metric::new(self.scales(), if same { &self.mixing.1 } else { &nothing })
+    }
+
+    /// The standard deviations of the present choices: those of previous windows, or 1 for
     /// choices without.
-    fn metric(&self) -> Vec<f64> {
+    fn scales(&self) -> Vec<f64> {
         let known =
             |(hash, n): &(u64, usize)| self.learnt.get(hash).filter(|m| m.len() == *n).cloned();
-        self.signature.iter().flat_map(|s| known(s).unwrap_or_else(|| vec![1.0; s.1])).collect()
+        let variances =
+            self.signature.iter().flat_map(|s| known(s).unwrap_or_else(|| vec![1.0; s.1]));
+        variances.map(f64::sqrt).collect()
     }
 
     /// Doubles or halves the step size until the acceptance probability of one leapfrog
@@ -233,12 +259,10 @@ impl Adaptation {
             if direction > 0.0 && round >= DOUBLINGS {
                 break;
             }
-            let from = system.launch(here, &self.inverse_mass, rng);
-            let start = from.kinetic(&self.inverse_mass);
-            let ratio = match system.leapfrog(&from, step, &self.inverse_mass)? {
-                Some(to) => {
-                    to.log_density - here.log_density + start - to.kinetic(&self.inverse_mass)
-                }
+            let from = system.launch(here, &self.metric, rng);
+            let start = from.kinetic();
+            let ratio = match system.leapfrog(&from, step, &self.metric)? {
+                Some(to) => to.log_density - here.log_density + start - to.kinetic(),
                 None => f64::NEG_INFINITY,
             };
             let up = if ratio > libm::log(0.8) { 1.0 } else { -1.0 };
@@ -288,16 +312,16 @@ mod tests {
     fn a_step_stays_as_long_as_it_was_when_the_metric_changes() {
         let mut adaptation = Adaptation::new(0.8, None);
         adaptation.signature = vec![(7, 1)];
-        adaptation.inverse_mass = vec![1.0];
+        adaptation.metric = Metric::new(vec![1.0], &Mixing::default());
         adaptation.step = 1e-30;
         adaptation.averaged = 1e-30;
         adaptation.mean_log = libm::log(1e-30);
         for i in 0..BURN + WINDOW {
-            adaptation.learn(0.8, &[1e-30 * f64::from(i % 5)]);
+            adaptation.learn(0.8, &[1e-30 * f64::from(i % 5)], &[0.0]);
         }
         // It is to be searched for, from about where it was.
         assert_eq!(adaptation.step, 0.0);
-        let length = adaptation.averaged * adaptation.inverse_mass[0].sqrt();
+        let length = adaptation.averaged * adaptation.metric.scales[0];
         assert!((length / 1e-30 - 1.0).abs() < 1e-6, "{length}");
     }
 }

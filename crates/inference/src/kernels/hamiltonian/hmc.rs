@@ -46,15 +46,15 @@ impl Trajectory for FixedSteps {
     }
 
     fn walk(&self, path: &mut Path) -> TraceResult<End> {
-        let Path { system, here, step, inverse_mass, rng } = path;
+        let Path { system, here, step, metric, rng } = path;
         // A random length, so that trajectories do not keep returning to their starting
         // point.
         let step = *step * (0.9 + 0.2 * rng.uniform());
-        let mut point = system.launch(here, inverse_mass, rng);
-        let energy = point.kinetic(inverse_mass);
+        let mut point = system.launch(here, metric, rng);
+        let energy = point.kinetic();
         let mut there = true;
         for _ in 0..self.0 {
-            match system.leapfrog(&point, step, inverse_mass)? {
+            match system.leapfrog(&point, step, metric)? {
                 Some(to) => point = to,
                 None => {
                     there = false;
@@ -63,7 +63,7 @@ impl Trajectory for FixedSteps {
             }
         }
         let ratio = if there {
-            point.log_density - here.log_density + energy - point.kinetic(inverse_mass)
+            point.log_density - here.log_density + energy - point.kinetic()
         } else {
             f64::NEG_INFINITY
         };

@@ -3,6 +3,7 @@
 
 use super::adapt::Adaptation;
 use super::memory::Memory;
+use super::metric::Metric;
 use super::point::Point;
 use super::summed::with_alternatives;
 use super::system::System;
@@ -29,7 +30,7 @@ pub(super) struct Path<'s, 'a> {
     pub system: &'s mut System<'a>,
     pub here: &'s Point,
     pub step: f64,
-    pub inverse_mass: &'s [f64],
+    pub metric: &'s Metric,
     pub rng: &'s mut Stream,
 }
 
@@ -133,13 +134,13 @@ impl<T: Trajectory> Hamiltonian<T> {
         rng: &mut Stream,
     ) -> TraceResult<Outcome> {
         let step = adaptation.step(&mut system, &here, at.adapting, rng)?;
-        let inverse_mass = &adaptation.inverse_mass;
-        let mut path = Path { system: &mut system, here: &here, step, inverse_mass, rng };
+        let metric = &adaptation.metric;
+        let mut path = Path { system: &mut system, here: &here, step, metric, rng };
         let end = trajectory.walk(&mut path)?;
         let moved = system.finish_at(end.to.as_deref())?;
         if at.adapting {
-            let y = end.to.as_ref().filter(|_| moved).map_or(&here.y, |to| &to.y);
-            adaptation.learn(end.acceptance, y);
+            let there = end.to.as_ref().filter(|_| moved).unwrap_or(&here);
+            adaptation.learn(end.acceptance, &there.y, &there.gradient);
         }
         Ok(Outcome {
             failed: u32::from(end.failed),

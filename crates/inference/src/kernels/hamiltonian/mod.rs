@@ -9,11 +9,13 @@
 
 mod adapt;
 mod ascent;
+mod curvature;
 pub(super) mod hmc;
 mod kernel;
 mod laplace;
 pub(super) mod mala;
 mod memory;
+mod metric;
 pub(super) mod modes;
 pub(super) mod nuts;
 mod point;

@@ -6,6 +6,7 @@
 //! values and scores that the trace takes from the tape, which are the same.
 
 use super::memory::{Layout, Memory};
+use super::metric::Metric;
 use super::point::Point;
 use super::summed::Summed;
 use crate::kernel::{StepContext, recoverable};
@@ -226,49 +227,38 @@ impl<'a> System<'a> {
         Ok(there.then_some(shared))
     }
 
-    /// Makes one leapfrog step with these inverse masses.
+    /// Makes one leapfrog step in the space of a metric.
     pub fn leapfrog(
         &mut self,
         from: &Point,
         step: f64,
-        inverse_mass: &[f64],
+        metric: &Metric,
     ) -> TraceResult<Option<Arc<Point>>> {
         let mut shared = self.memory.point();
         let Some(to) = Arc::get_mut(&mut shared) else { return Ok(None) };
-        let n = from.y.len();
-        for list in [&mut to.momentum, &mut to.y, &mut to.velocity] {
-            list.resize(n, 0.0);
-        }
         let half = 0.5 * step;
-        let before = from.momentum.iter().zip(&from.gradient).zip(&from.y).zip(inverse_mass);
-        let after = to.momentum.iter_mut().zip(&mut to.y);
-        for ((p, y), (((from_p, g), from_y), m)) in after.zip(before) {
-            *p = from_p + half * g;
-            *y = from_y + step * m * *p;
-        }
+        to.momentum.clear();
+        to.momentum.extend(from.momentum.iter().zip(&from.force).map(|(p, f)| p + half * f));
+        metric.push(&from.y, step, &to.momentum, &mut to.y);
         let there = self.evaluate(to)?;
         if there {
-            let forces = to.gradient.iter().zip(inverse_mass);
-            for ((p, v), (g, m)) in to.momentum.iter_mut().zip(&mut to.velocity).zip(forces) {
-                *p += half * g;
-                *v = *p * m;
-            }
+            metric.pull(&to.gradient, &mut to.force);
+            to.momentum.iter_mut().zip(&to.force).for_each(|(p, f)| *p += half * f);
         }
         self.memory.keep(&shared);
         Ok(there.then_some(shared))
     }
 
-    /// The same point with a momentum drawn for these inverse masses.
-    pub fn launch(&mut self, here: &Point, inverse_mass: &[f64], rng: &mut Stream) -> Arc<Point> {
+    /// The same point with a momentum drawn in the space of a metric.
+    pub fn launch(&mut self, here: &Point, metric: &Metric, rng: &mut Stream) -> Arc<Point> {
         let mut shared = self.memory.point();
         if let Some(point) = Arc::get_mut(&mut shared) {
             point.y.clone_from(&here.y);
             point.gradient.clone_from(&here.gradient);
             point.log_density = here.log_density;
+            metric.pull(&here.gradient, &mut point.force);
             point.momentum.clear();
-            point.momentum.extend(inverse_mass.iter().map(|m| rng.standard_normal() / m.sqrt()));
-            point.velocity.clear();
-            point.velocity.extend(point.momentum.iter().zip(inverse_mass).map(|(p, m)| p * m));
+            point.momentum.extend((0..metric.dimensions()).map(|_| rng.standard_normal()));
         }
         self.memory.keep(&shared);
         shared

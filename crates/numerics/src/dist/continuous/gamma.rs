@@ -65,6 +65,11 @@ impl Scalar for Gamma {
         Slope::new(by_x, [by_shape, self.shape / self.rate - x])
     }
 
+    #[inline]
+    fn slope_without_shape(&self, x: f64) -> Slope {
+        Slope::new((self.shape - 1.0) / x - self.rate, [0.0, self.shape / self.rate - x])
+    }
+
     fn tails(&self, x: f64) -> Option<Tails> {
         gamma_tails(self.shape, self.rate * x).map(Tails::from)
     }

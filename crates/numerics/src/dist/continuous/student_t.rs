@@ -11,17 +11,37 @@ pub struct StudentT {
     df: f64,
     location: f64,
     scale: f64,
+    /// The part of `log_norm` that the scale does not change.
+    log_shape: f64,
     log_norm: f64,
 }
 
 impl StudentT {
     pub(in crate::dist) fn of(df: f64, location: f64, scale: f64) -> Result<StudentT, ParamError> {
-        let log_norm = -ln_beta(0.5 * df, 0.5) - 0.5 * libm::log(df) - libm::log(scale);
-        Ok(StudentT { df, location, scale, log_norm })
+        let log_shape = -ln_beta(0.5 * df, 0.5) - 0.5 * libm::log(df);
+        let log_norm = log_shape - libm::log(scale);
+        Ok(StudentT { df, location, scale, log_shape, log_norm })
     }
 }
 
 impl StudentT {
+    /// Returns minus the derivative with respect to the number, and z times that in units of
+    /// the scale, z the distance from the location in units of the scale.
+    #[inline]
+    fn slopes_of_place(&self, x: f64) -> (f64, f64) {
+        let (df, z) = (self.df, standard(x, self.location, self.scale));
+        let t = z / self.df.sqrt();
+        // (df + 1) z / (df + z^2), and z times that.
+        let (once, twice) = if t.abs() < 1.0 {
+            let weight = (df + 1.0) / (df * (1.0 + t * t));
+            (weight * z, weight * z * z)
+        } else {
+            ((df + 1.0) / (z + df / z), (df + 1.0) / (1.0 + df / z / z))
+        };
+        let by_x = if z.is_finite() { once / self.scale } else { (df + 1.0) / (x - self.location) };
+        (by_x, twice)
+    }
+
     /// Returns ln(1 + z^2 / df), where z is the distance from the location in units of
     /// the scale.
     #[inline]
@@ -52,19 +72,35 @@ impl Scalar for StudentT {
     }
 
     fn slope(&self, x: f64) -> Slope {
-        let (df, z) = (self.df, standard(x, self.location, self.scale));
-        let t = z / df.sqrt();
-        // (df + 1) z / (df + z^2), and z times that.
-        let (once, twice) = if t.abs() < 1.0 {
-            let weight = (df + 1.0) / (df * (1.0 + t * t));
-            (weight * z, weight * z * z)
-        } else {
-            ((df + 1.0) / (z + df / z), (df + 1.0) / (1.0 + df / z / z))
-        };
+        let df = self.df;
+        let (by_x, twice) = self.slopes_of_place(x);
         let norm = 0.5 * (digamma(0.5 * (df + 1.0)) - digamma(0.5 * df) - 1.0 / df);
         let by_df = norm - 0.5 * self.log_tail(x) + 0.5 * twice / df;
-        let by_x = if z.is_finite() { once / self.scale } else { (df + 1.0) / (x - self.location) };
         Slope::new(-by_x, [by_df, by_x, (twice - 1.0) / self.scale])
+    }
+
+    #[inline]
+    fn slope_without_shape(&self, x: f64) -> Slope {
+        let (by_x, twice) = self.slopes_of_place(x);
+        Slope::new(-by_x, [0.0, by_x, (twice - 1.0) / self.scale])
+    }
+
+    /// Degrees of freedom that stay as they were keep their part of the norm, and a scale
+    /// that stays keeps all of it.
+    #[inline]
+    fn reused(&self, params: &[f64]) -> Option<StudentT> {
+        let [df, location, scale] = *params else { return None };
+        let same = |a: f64, b: f64| a.to_bits() == b.to_bits();
+        let valid = same(df, self.df) && location.is_finite() && scale > 0.0 && scale.is_finite();
+        valid.then(|| StudentT {
+            location,
+            scale,
+            log_norm: match same(scale, self.scale) {
+                true => self.log_norm,
+                false => self.log_shape - libm::log(scale),
+            },
+            ..*self
+        })
     }
 
     fn tails(&self, x: f64) -> Option<Tails> {

@@ -85,7 +85,7 @@ macro_rules! of_truth {
             }
 
             #[inline]
-            fn slopes(&self, x: f64) -> (f64, [f64; 1]) {
+            fn slopes(&self, x: f64, _: bool) -> (f64, [f64; 1]) {
                 (0.0, [self.slope(x != 0.0)])
             }
         }
