@@ -121,7 +121,7 @@ impl Network {
 }
 
 /// Returns a list of this length with arbitrary values, reusing the smallest buffer that
-/// is large enough.
+/// is large enough. If none is, the largest is freed, so that small ones do not pile up.
 fn reuse(free: &mut Vec<Vec<f32>>, len: usize) -> Vec<f32> {
     let fits = free
         .iter()
@@ -134,6 +134,12 @@ fn reuse(free: &mut Vec<Vec<f32>>, len: usize) -> Vec<f32> {
             v.resize(len, 0.0);
             v
         }
-        None => vec![0.0; len],
+        None => {
+            let largest = (0..free.len()).max_by_key(|i| free[*i].capacity());
+            if let Some(i) = largest {
+                drop(free.swap_remove(i));
+            }
+            vec![0.0; len]
+        }
     }
 }

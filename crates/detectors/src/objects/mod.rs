@@ -15,7 +15,7 @@ mod tests;
 pub use classes::CLASSES;
 
 use crate::nn::{Network, NetworkError};
-use pcadlang_numerics::platform::threads::side_by_side;
+use pcadlang_numerics::platform::threads::map_side_by_side;
 use pcadlang_scene::vision::Photo;
 
 /// The side of the network's input, in samples.
@@ -119,12 +119,8 @@ impl ObjectFinder {
         views: &[View],
         options: &ObjectOptions,
     ) -> Result<Vec<FoundObject>, NetworkError> {
-        let mut looked: Vec<_> = views.iter().map(|view| (*view, Ok(Vec::new()))).collect();
-        side_by_side(looked.iter_mut(), |_, (view, found)| {
-            *found = self.find(photo, *view, options);
-        });
-        let found = looked.into_iter().map(|(_, found)| found);
-        let mut all = found.collect::<Result<Vec<_>, _>>()?.concat();
+        let found = map_side_by_side(views, |view| self.find(photo, *view, options));
+        let mut all = found.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
         all.sort_by(|a, b| b.score.total_cmp(&a.score));
         Ok(all)
     }

@@ -1,8 +1,11 @@
 //! The fraction of every pixel that a solid covers.
 //!
-//! Pixels are sampled in rows of 64, a word for each, so a triangle's row of samples is set a
-//! word at a time. Triangles that share an edge find the same place for it in each row, so no
-//! sample is lost between them. What hides what does not matter.
+//! Pixels are sampled in rows of [`COLUMNS`]. From the left end of a row, the sides of faces that
+//! are crossed tell how many faces there are at each sample: a side that enters its face adds
+//! one, a side that leaves it takes one away. A side between two faces that are both drawn does
+//! neither, so only the sides where drawn faces end are followed. Faces that share a side find
+//! the same place for it in each row, so no sample is lost between them. What hides what does
+//! not matter.
 
 use crate::geom::{Mesh, Solid};
 use crate::render::pixels::place::Point;
@@ -10,25 +13,43 @@ use crate::render::pixels::project::{Placement, Projected, Vertices, project};
 use crate::render::pixels::raster::{back_of, cut_triangles};
 use crate::render::simd::vectorised;
 use crate::render::{Camera, Frame};
+use std::cell::RefCell;
 use std::ops::Range;
 use std::sync::Arc;
 
 /// Samples in a row of a pixel, and rows of them.
-pub(in crate::render) const COLUMNS: usize = u64::BITS as usize;
+pub(in crate::render) const COLUMNS: usize = 64;
 pub(in crate::render) const ROWS: usize = 4;
 
 /// Columns and rows of finer pixels in one, where there are no samples.
 const FINER: u32 = 8;
-/// The most pixels of a finer picture, and the most words of samples.
+/// The most pixels of a finer picture, and the most of samples' rows within a pixel.
 const MOST: usize = 1 << 22;
 
 /// The coverage of each pixel by a solid.
 pub(in crate::render) struct Fractions {
     /// The fraction of every pixel, 0 to 1, row by row.
     pub values: Arc<[f32]>,
-    /// `None` if the values are from a finer picture.
-    pub samples: Option<Samples>,
-    pub projected: Projected,
+    /// `None` if the values are from a finer picture, or if the near plane cuts a mesh.
+    pub outline: Option<Outline>,
+}
+
+/// Where covered samples begin and end.
+pub(in crate::render) struct Outline {
+    /// The sides where faces end, in samples.
+    pub edges: Vec<Edge>,
+    /// The crossings between a sample that is covered and one that is not, row by row.
+    pub crossings: Vec<Crossing>,
+}
+
+/// A side that separates a sample from the one to the left of it.
+pub(in crate::render) struct Crossing {
+    pub row: u32,
+    pub column: u32,
+    /// The index of the side.
+    pub edge: u32,
+    /// True if the sample to the right is the covered one.
+    pub enters: bool,
 }
 
 impl Fractions {
@@ -37,27 +58,43 @@ impl Fractions {
         if camera.pixels().saturating_mul(ROWS) > MOST {
             return None;
         }
-        let mut projected = Projected::default();
-        project(solid, camera, &mut projected);
-        let mut samples = Samples::none(camera.width as usize, camera.height as usize);
+        let (width, height) = (camera.width as usize, camera.height as usize);
+        let mut samples = Samples::none(width, height);
         // Of triangles that the near plane cuts, those that cover no pixel are left out; so in
         // much smaller pixels.
         let finer = camera.finer(COLUMNS as u32);
-        for (i, item) in solid.instances().iter().enumerate() {
-            let (mesh, vertices) = (&item.mesh, projected.mesh(i));
-            let placement = Placement::new(camera, &item.affine);
-            match vertices.whole {
-                _ if vertices.outside(camera) => {}
-                true => samples.add_mesh(mesh, &vertices, back_of(mesh, &placement, true)),
-                false => cut_triangles(mesh, &placement, &finer, &vertices, |triangle, _, _| {
-                    let smaller = |v: f64| v / COLUMNS as f64;
-                    let points = triangle.points.each_ref();
-                    samples.add(&points.map(|p| Point { x: smaller(p.x), y: smaller(p.y), ..*p }));
-                }),
+        let (mut whole, mut first) = (true, 0);
+        SCRATCH.with_borrow_mut(|scratch| {
+            let Scratch { projected, rows, drawn } = scratch;
+            project(solid, camera, projected);
+            for (i, item) in solid.instances().iter().enumerate() {
+                let (mesh, vertices) = (&item.mesh, projected.mesh(i));
+                let placement = Placement::new(camera, &item.affine);
+                match vertices.whole {
+                    _ if vertices.outside(camera) => {}
+                    true => {
+                        let back = back_of(mesh, &placement, true);
+                        samples.add_mesh(mesh, &vertices, back, first, drawn);
+                    }
+                    false => {
+                        cut_triangles(mesh, &placement, &finer, &vertices, |triangle, _, _| {
+                            let smaller = |v: f64| v / COLUMNS as f64;
+                            let points = triangle.points.each_ref();
+                            samples.add(&points.map(|p| Point {
+                                x: smaller(p.x),
+                                y: smaller(p.y),
+                                ..*p
+                            }));
+                        })
+                    }
+                }
+                whole &= vertices.whole;
+                first += vertices.len() as u32;
             }
-        }
-        let values = samples.fractions().into();
-        Some(Fractions { values, samples: Some(samples), projected })
+            let (values, crossings) = samples.count(rows);
+            let outline = whole.then_some(Outline { edges: samples.edges, crossings });
+            Some(Fractions { values, outline })
+        })
     }
 
     /// Those in a finer picture, drawn by `draw`: for what has no mesh, and for pictures so
@@ -79,147 +116,262 @@ impl Fractions {
             }
         }
         let values = counts.into_iter().map(|count| count as f32 / (by * by) as f32).collect();
-        Fractions { values, samples: None, projected: Projected::default() }
+        Fractions { values, outline: None }
     }
 }
 
-/// Which samples are covered: a word for each pixel, in each row of samples.
-pub(in crate::render) struct Samples {
-    /// In pixels.
-    pub width: usize,
-    /// Of samples.
-    pub rows: usize,
-    pub words: Vec<u64>,
+thread_local! {
+    static SCRATCH: RefCell<Scratch> = RefCell::default();
 }
 
-/// An edge from its upper to its lower end, in samples: whole numbers are their places.
+/// Buffers that are reused.
+#[derive(Default)]
+struct Scratch {
+    projected: Projected,
+    rows: RowLists,
+    /// For each face of a mesh how it is drawn; see [`faces`].
+    drawn: Vec<i8>,
+}
+
+/// What is crossed in each row of samples.
+#[derive(Default)]
+struct RowLists {
+    /// Where each row's crossings begin among all of them.
+    begins: Vec<u32>,
+    all: Vec<u64>,
+}
+
+/// A side from its upper to its lower end, in samples: whole numbers are their places.
 #[derive(Clone, Copy)]
 pub(in crate::render) struct Edge {
     pub from: [f64; 2],
     pub to: [f64; 2],
     /// Of x by y.
     pub slope: f64,
+    /// Those that are entered less those that are left, from left to right.
+    faces: i32,
+    /// The indices of the ends among the vertices of all meshes; 0 if the near plane cut.
+    pub vertices: [u32; 2],
 }
 
 impl Edge {
+    /// From a side that has its faces below if it leads to the right.
     #[inline(always)]
-    pub fn new(from: [f64; 2], to: [f64; 2]) -> Edge {
-        Edge { from, to, slope: (to[0] - from[0]) / (to[1] - from[1]) }
+    fn new([from, to]: [[f64; 2]; 2], vertices: [u32; 2], faces: i32) -> Edge {
+        if from[1] > to[1] {
+            return Edge::new([to, from], [vertices[1], vertices[0]], -faces);
+        }
+        Edge { from, to, slope: (to[0] - from[0]) / (to[1] - from[1]), faces, vertices }
     }
 
     /// The rows that it crosses, of that many.
     #[inline(always)]
-    pub fn rows(&self, most: usize) -> Range<usize> {
+    fn rows(&self, most: usize) -> Range<usize> {
         first(self.from[1], most)..first(self.to[1], most)
     }
 
     /// Where it crosses a row.
     #[inline(always)]
-    pub fn at(&self, row: usize) -> f64 {
+    fn at(&self, row: usize) -> f64 {
         self.from[0] + (row as f64 - self.from[1]) * self.slope
     }
 }
 
 /// The first whole number from `v` on, at least 0 and at most `most`; 0 for NaN.
 #[inline(always)]
-pub(in crate::render) fn first(v: f64, most: usize) -> usize {
+fn first(v: f64, most: usize) -> usize {
     (v.ceil().max(0.0) as usize).min(most)
 }
 
 /// A position in the picture, in samples.
 #[inline(always)]
-pub(in crate::render) fn in_samples(p: &Point) -> [f64; 2] {
+fn in_samples(p: &Point) -> [f64; 2] {
     [p.x * COLUMNS as f64 - 0.5, p.y * ROWS as f64 - 0.5]
 }
 
-/// True if a triangle has the orientation `back`, as in [`back_of`].
+/// The double area of a triangle in the picture, above 0 where the corners follow each other
+/// clockwise.
 #[inline(always)]
-pub(in crate::render) fn is_back([a, b, c]: &[Point; 3], back: f64) -> bool {
-    ((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)) * back > 0.0
+fn clockwise([a, b, c]: &[Point; 3]) -> f64 {
+    (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
 }
+
+/// How the faces of a mesh are drawn: 1 counter-clockwise, -1 clockwise, 0 not, as it has the
+/// orientation `back` of [`back_of`]. After the last there is a 0, for no face.
+#[inline(always)]
+fn faces(mesh: &Mesh, vertices: &Vertices<'_>, back: f64, drawn: &mut Vec<i8>) {
+    drawn.clear();
+    let way = |corners: &[u32; 3]| {
+        let turn = clockwise(&corners.map(|v| vertices.point(v)));
+        match back == 0.0 {
+            true => 1 - 2 * i8::from(turn > 0.0),
+            false => i8::from(turn * back <= 0.0) * if back > 0.0 { 1 } else { -1 },
+        }
+    };
+    drawn.extend(mesh.topology.triangles.iter().map(way));
+    drawn.push(0);
+}
+
+/// A picture's rows of samples, and the sides that cross them.
+struct Samples {
+    /// In pixels.
+    width: usize,
+    /// Of samples.
+    rows: usize,
+    edges: Vec<Edge>,
+}
+
+/// Bits of the number of faces in a crossing, of which this is none, and of the side's index.
+const FACES_BITS: u32 = 4;
+const NO_FACES: i32 = 1 << (FACES_BITS - 1);
+const EDGE_BITS: u32 = 32;
 
 impl Samples {
     fn none(width: usize, height: usize) -> Samples {
-        Samples { width, rows: height * ROWS, words: vec![0; width * height * ROWS] }
+        Samples { width, rows: height * ROWS, edges: Vec::with_capacity(512) }
     }
 
-    /// Adds the triangles of a mesh that is beyond the near plane, save those with the
-    /// orientation `back`.
-    fn add_mesh(&mut self, mesh: &Mesh, vertices: &Vertices<'_>, back: f64) {
+    /// Adds the sides where faces of a mesh that is beyond the near plane end, save those of
+    /// faces with the orientation `back`. `first` is the index of its first vertex among all.
+    fn add_mesh(
+        &mut self,
+        mesh: &Mesh,
+        vertices: &Vertices<'_>,
+        back: f64,
+        first: u32,
+        drawn: &mut Vec<i8>,
+    ) {
+        let sides = mesh.topology.sides.of(&mesh.topology.triangles);
         vectorised(
             #[inline(always)]
             || {
-                for corners in &mesh.topology.triangles {
-                    let points = corners.map(|v| vertices.point(v));
-                    if !is_back(&points, back) {
-                        self.add(&points);
+                faces(mesh, vertices, back, drawn);
+                for side in sides {
+                    let [own, other] = side.faces.map(|f| drawn.get(f as usize).copied());
+                    let faces = own.unwrap_or(0) - other.unwrap_or(0);
+                    if faces != 0 {
+                        let ends = side.vertices.map(|v| in_samples(&vertices.point(v)));
+                        let places = side.vertices.map(|v| first + v);
+                        self.push(Edge::new(ends, places, i32::from(faces)));
                     }
                 }
             },
         );
     }
 
-    /// Adds a triangle in the picture.
-    #[inline(always)]
+    /// Adds a triangle in the picture, whichever way it turns.
     fn add(&mut self, points: &[Point; 3]) {
-        let [mut a, mut b, mut c] = points.each_ref().map(in_samples);
-        if a[1] > b[1] {
-            std::mem::swap(&mut a, &mut b);
-        }
-        if b[1] > c[1] {
-            std::mem::swap(&mut b, &mut c);
-        }
-        if a[1] > b[1] {
-            std::mem::swap(&mut a, &mut b);
-        }
-        let long = Edge::new(a, c);
-        for short in [Edge::new(a, b), Edge::new(b, c)] {
-            for row in short.rows(self.rows) {
-                let (x, y) = (long.at(row), short.at(row));
-                self.add_between(row, if x < y { [x, y] } else { [y, x] });
-            }
-        }
-    }
-
-    /// Adds the samples of a row between two places.
-    #[inline(always)]
-    fn add_between(&mut self, row: usize, ends: [f64; 2]) {
-        let [left, right] = ends.map(|x| first(x, self.width * COLUMNS));
-        if left >= right {
+        let turn = clockwise(points);
+        let places = points.each_ref().map(in_samples);
+        // Written so that it is true for NaN.
+        if !(turn.abs() < f64::INFINITY) {
             return;
         }
-        let start = row * self.width;
-        let ends = start + left / COLUMNS..=start + (right - 1) / COLUMNS;
-        let head = u64::MAX << (left % COLUMNS);
-        let tail = u64::MAX >> (COLUMNS - 1 - (right - 1) % COLUMNS);
-        match self.words.get_mut(ends) {
-            None | Some([]) => {}
-            Some([only]) => *only |= head & tail,
-            Some([first, between @ .., last]) => {
-                *first |= head;
-                between.fill(u64::MAX);
-                *last |= tail;
+        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+            let faces = if turn > 0.0 { -1 } else { 1 };
+            self.push(Edge::new([places[i], places[j]], [0; 2], faces));
+        }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, edge: Edge) {
+        if !edge.rows(self.rows).is_empty() {
+            self.edges.push(edge);
+        }
+    }
+
+    /// Puts in order what is crossed in each row.
+    #[inline(always)]
+    fn sort(&self, RowLists { begins, all }: &mut RowLists) {
+        // How many more are crossed in a row than in the one before it, then the sums.
+        begins.clear();
+        begins.resize(self.rows + 2, 0);
+        for edge in &self.edges {
+            let rows = edge.rows(self.rows);
+            begins[rows.start + 1] = begins[rows.start + 1].wrapping_add(1);
+            begins[rows.end + 1] = begins[rows.end + 1].wrapping_sub(1);
+        }
+        let (mut here, mut sum) = (0u32, 0u32);
+        for begin in begins.iter_mut() {
+            here = here.wrapping_add(*begin);
+            // Where the row before this one ends, if nothing is in it yet.
+            (*begin, sum) = (sum, sum + here);
+        }
+        all.clear();
+        all.resize(sum as usize, 0);
+        for (i, edge) in (0u64..).zip(&self.edges) {
+            for row in edge.rows(self.rows) {
+                let column = first(edge.at(row), self.width * COLUMNS) as u64;
+                let faces = (edge.faces + NO_FACES) as u64;
+                let next = &mut begins[row + 1];
+                all[*next as usize] = (column << EDGE_BITS | i) << FACES_BITS | faces;
+                *next += 1;
             }
         }
-    }
-
-    /// True if a sample is covered.
-    #[inline(always)]
-    pub fn has(&self, row: usize, column: usize) -> bool {
-        let word = self.words.get(row * self.width + column / COLUMNS);
-        word.is_some_and(|word| word >> (column % COLUMNS) & 1 == 1)
-    }
-
-    fn fractions(&self) -> Vec<f32> {
-        let width = self.width.max(1);
-        let mut out = Vec::with_capacity(self.words.len() / ROWS);
-        for rows in self.words.chunks(width * ROWS) {
-            let count = |i: usize| -> u32 {
-                rows.iter().skip(i).step_by(width).map(|word| word.count_ones()).sum()
-            };
-            out.extend((0..width).map(|i| count(i) as f32 / (COLUMNS * ROWS) as f32));
+        for row in begins.windows(2) {
+            all[row[0] as usize..row[1] as usize].sort_unstable();
         }
-        out
+    }
+
+    /// The fraction of each pixel, and where covered samples begin and end.
+    fn count(&self, lists: &mut RowLists) -> (Arc<[f32]>, Vec<Crossing>) {
+        let mut counts = vec![0u16; self.width * self.rows / ROWS];
+        let mut crossings = Vec::with_capacity(4 * self.rows);
+        vectorised(
+            #[inline(always)]
+            || {
+                self.sort(lists);
+                for row in 0..self.rows {
+                    let [begin, end] = [row, row + 1].map(|row| lists.begins[row] as usize);
+                    let pixels = row / ROWS * self.width..(row / ROWS + 1) * self.width;
+                    let list = &lists.all[begin..end];
+                    row_of(list, row as u32, &mut counts[pixels], &mut crossings);
+                }
+            },
+        );
+        let fraction = |count: u16| f32::from(count) / (COLUMNS * ROWS) as f32;
+        (counts.into_iter().map(fraction).collect(), crossings)
+    }
+}
+
+/// Counts the covered samples of a row by pixel, from what is crossed in it, in order.
+#[inline(always)]
+fn row_of(list: &[u64], row: u32, counts: &mut [u16], crossings: &mut Vec<Crossing>) {
+    let (mut faces, mut begin, mut rest) = (0, 0, list);
+    while let Some(next) = rest.first() {
+        let column = next >> (FACES_BITS + EDGE_BITS);
+        let before = faces;
+        let change = |key: &u64| (key & ((1 << FACES_BITS) - 1)) as i32 - NO_FACES;
+        let here = rest.iter().take_while(|key| *key >> (FACES_BITS + EDGE_BITS) == column);
+        faces += here.clone().map(change).sum::<i32>();
+        let enters = faces > 0;
+        if enters != (before > 0) {
+            // Of those in one place, the first that goes the way of all.
+            let edge = here.clone().find(|key| (change(key) > 0) == enters).unwrap_or(next);
+            let edge = (edge >> FACES_BITS) as u32;
+            crossings.push(Crossing { row, column: column as u32, edge, enters });
+            match enters {
+                true => begin = column as usize,
+                false => add_between(counts, begin, column as usize),
+            }
+        }
+        rest = &rest[here.count()..];
+    }
+}
+
+/// Adds the samples between two columns to those of their pixels.
+#[inline(always)]
+fn add_between(counts: &mut [u16], begin: usize, end: usize) {
+    if begin >= end {
+        return;
+    }
+    let (from, to) = (begin / COLUMNS, (end - 1) / COLUMNS);
+    if let Some(counts) = counts.get_mut(from..=to) {
+        counts.iter_mut().for_each(|count| *count += COLUMNS as u16);
+        let within = [begin % COLUMNS, (to + 1) * COLUMNS - end];
+        for (at, less) in [0, to - from].into_iter().zip(within) {
+            counts[at] -= less as u16;
+        }
     }
 }
 
@@ -246,6 +398,27 @@ mod tests {
         (0..camera.pixels()).map(count).collect()
     }
 
+    fn values(samples: &Samples) -> Arc<[f32]> {
+        samples.count(&mut RowLists::default()).0
+    }
+
+    /// Fractions from all sides of all faces that are drawn.
+    fn by_faces(solid: &Solid, camera: &Camera) -> Arc<[f32]> {
+        let mut samples = Samples::none(camera.width as usize, camera.height as usize);
+        let mut projected = Projected::default();
+        project(solid, camera, &mut projected);
+        for (i, item) in solid.instances().iter().enumerate() {
+            let back = back_of(&item.mesh, &Placement::new(camera, &item.affine), true);
+            for corners in &item.mesh.topology.triangles {
+                let points = corners.map(|v| projected.mesh(i).point(v));
+                if clockwise(&points) * back <= 0.0 {
+                    samples.add(&points);
+                }
+            }
+        }
+        values(&samples)
+    }
+
     #[test]
     fn triangles_that_share_edges_lose_no_sample_between_them() {
         let mut samples = Samples::none(7, 5);
@@ -256,12 +429,12 @@ mod tests {
         for i in 0..6 {
             samples.add(&[around[i], middle, around[(i + 1) % 6]]);
         }
-        assert!(samples.fractions().iter().all(|f| *f == 1.0));
+        assert!(values(&samples).iter().all(|f| *f == 1.0));
         let mut nothing = Samples::none(7, 5);
         nothing.add(&[point(f64::NAN, 1.0), point(2.0, 2.0), point(1.0, 4.0)]);
         nothing.add(&[point(1.0, 1.0), point(2.0, 1.0), point(5.0, 1.0)]);
         nothing.add(&[point(1e300, 1.0), point(1e300, 3.0), point(2e300, 2.0)]);
-        assert!(nothing.fractions().iter().all(|f| *f == 0.0));
+        assert!(values(&nothing).iter().all(|f| *f == 0.0));
     }
 
     #[test]
@@ -287,6 +460,16 @@ mod tests {
             for solid in [sphere(24, 12), cuboid(Vec3::new(1.4, 1.0, 0.8))] {
                 let solid = solid.placed(by);
                 let own = View::new(solid.clone(), camera).fractions(20);
+                if distance == 0.0 {
+                    prop_assert_eq!(&own, &by_faces(&solid, &camera));
+                    let mirror = Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(-1.0, 1.0, 1.0));
+                    let mirrored = solid.placed(mirror);
+                    let other = View::new(mirrored.clone(), camera).fractions(20);
+                    prop_assert_eq!(&other, &by_faces(&mirrored, &camera));
+                    let far = other.chunks(20).flat_map(|row| row.iter().rev()).zip(own.iter());
+                    let far = far.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                    prop_assert!(far < 0.02, "{far}");
+                }
                 let finer = by_pixels(&solid, &camera, 32);
                 let far = own.iter().zip(&finer).map(|(a, b)| (f64::from(*a) - b).abs());
                 let worst = far.fold(0.0, f64::max);
