@@ -158,11 +158,7 @@ pub const MOST_PARTS: usize = u16::MAX as usize;
 
 impl Mesh {
     /// Puts a mesh together from its vertices, a unit normal for each, and the rest.
-    pub fn of(
-        positions: Vec<Vec3>,
-        normals: impl Into<Normals>,
-        topology: Arc<Topology>,
-    ) -> Mesh {
+    pub fn of(positions: Vec<Vec3>, normals: impl Into<Normals>, topology: Arc<Topology>) -> Mesh {
         Mesh { positions, normals: normals.into(), topology }
     }
 

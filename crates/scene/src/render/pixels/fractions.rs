@@ -155,12 +155,13 @@ pub(in crate::render) struct Edge {
 }
 
 impl Edge {
-    /// From a side that has its faces below if it leads to the right.
+    /// From a side that enters so many faces, from left to right, if it leads downwards.
     #[inline(always)]
-    fn new([from, to]: [[f64; 2]; 2], vertices: [u32; 2], faces: i32) -> Edge {
-        if from[1] > to[1] {
-            return Edge::new([to, from], [vertices[1], vertices[0]], -faces);
-        }
+    fn new(ends: [[f64; 2]; 2], [v, w]: [u32; 2], faces: i32) -> Edge {
+        let ([from, to], vertices, faces) = match ends[0][1] > ends[1][1] {
+            true => ([ends[1], ends[0]], [w, v], -faces),
+            false => (ends, [v, w], faces),
+        };
         Edge { from, to, slope: (to[0] - from[0]) / (to[1] - from[1]), faces, vertices }
     }
 
@@ -200,16 +201,16 @@ fn clockwise([a, b, c]: &[Point; 3]) -> f64 {
 /// orientation `back` of [`back_of`]. After the last there is a 0, for no face.
 #[inline(always)]
 fn faces(mesh: &Mesh, vertices: &Vertices<'_>, back: f64, drawn: &mut Vec<i8>) {
-    drawn.clear();
-    let way = |corners: &[u32; 3]| {
+    let triangles = &mesh.topology.triangles;
+    drawn.resize(triangles.len() + 1, 0);
+    for (drawn, corners) in drawn.iter_mut().zip(triangles) {
         let turn = clockwise(&corners.map(|v| vertices.point(v)));
-        match back == 0.0 {
+        *drawn = match back == 0.0 {
             true => 1 - 2 * i8::from(turn > 0.0),
             false => i8::from(turn * back <= 0.0) * if back > 0.0 { 1 } else { -1 },
-        }
-    };
-    drawn.extend(mesh.topology.triangles.iter().map(way));
-    drawn.push(0);
+        };
+    }
+    drawn[triangles.len()] = 0;
 }
 
 /// A picture's rows of samples, and the sides that cross them.
