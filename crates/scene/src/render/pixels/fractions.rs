@@ -7,9 +7,9 @@
 //! the same place for it in each row, so no sample is lost between them. What hides what does
 //! not matter.
 
-use crate::geom::{Mesh, Solid};
+use crate::geom::{Affine, Instance, Mesh, Solid};
 use crate::render::pixels::place::Point;
-use crate::render::pixels::project::{Placement, Projected, Vertices, project};
+use crate::render::pixels::project::{Lens, Placement, Projected, Vertices};
 use crate::render::pixels::raster::{back_of, cut_triangles};
 use crate::render::simd::vectorised;
 use crate::render::{Camera, Frame};
@@ -36,10 +36,32 @@ pub(in crate::render) struct Fractions {
 
 /// Where covered samples begin and end.
 pub(in crate::render) struct Outline {
+    camera: Camera,
+    meshes: Vec<Followed>,
     /// The sides where faces end, in samples.
     pub edges: Vec<Edge>,
     /// The crossings between a sample that is covered and one that is not, row by row.
     pub crossings: Vec<Crossing>,
+}
+
+/// A mesh whose sides were followed.
+struct Followed {
+    mesh: Arc<Mesh>,
+    affine: Affine,
+    /// The index of its first vertex among all, and of its sides.
+    first: u32,
+    edges: Range<usize>,
+}
+
+impl Outline {
+    /// The sides of mesh `i`, if it was the same at the same place.
+    fn same(&self, i: usize, item: &Instance, first: u32) -> Option<&[Edge]> {
+        let was = self.meshes.get(i)?;
+        let bits = |a: &Affine| a.0.to_cols_array().map(f64::to_bits);
+        let same = Arc::ptr_eq(&was.mesh, &item.mesh) && was.first == first;
+        let same = same && bits(&was.affine) == bits(&item.affine);
+        self.edges.get(was.edges.clone()).filter(|_| same)
+    }
 }
 
 /// A side that separates a sample from the one to the left of it.
@@ -53,46 +75,44 @@ pub(in crate::render) struct Crossing {
 }
 
 impl Fractions {
-    /// Those of the meshes of a solid, unless the picture is too large.
-    pub fn of(solid: &Solid, camera: &Camera) -> Option<Fractions> {
+    /// Those of the meshes of a solid, unless the picture is too large. The sides of meshes that
+    /// are where they were `before` are taken from there.
+    pub fn of(solid: &Solid, camera: &Camera, before: Option<&Fractions>) -> Option<Fractions> {
         if camera.pixels().saturating_mul(ROWS) > MOST {
             return None;
         }
-        let (width, height) = (camera.width as usize, camera.height as usize);
-        let mut samples = Samples::none(width, height);
-        // Of triangles that the near plane cuts, those that cover no pixel are left out; so in
-        // much smaller pixels.
-        let finer = camera.finer(COLUMNS as u32);
-        let (mut whole, mut first) = (true, 0);
-        SCRATCH.with_borrow_mut(|scratch| {
-            let Scratch { projected, rows, drawn } = scratch;
-            project(solid, camera, projected);
+        let before = before.and_then(|b| b.outline.as_ref()).filter(|b| b.camera == *camera);
+        let mut samples = Samples::none(camera.width as usize, camera.height as usize);
+        let (lens, mut whole, mut first) = (Lens::new(camera), true, 0);
+        let mut meshes = Vec::with_capacity(solid.instances().len());
+        SCRATCH.with_borrow_mut(|Scratch { projected, rows, drawn }| {
             for (i, item) in solid.instances().iter().enumerate() {
-                let (mesh, vertices) = (&item.mesh, projected.mesh(i));
-                let placement = Placement::new(camera, &item.affine);
-                match vertices.whole {
-                    _ if vertices.outside(camera) => {}
-                    true => {
-                        let back = back_of(mesh, &placement, true);
-                        samples.add_mesh(mesh, &vertices, back, first, drawn);
-                    }
-                    false => {
-                        cut_triangles(mesh, &placement, &finer, &vertices, |triangle, _, _| {
-                            let smaller = |v: f64| v / COLUMNS as f64;
-                            let points = triangle.points.each_ref();
-                            samples.add(&points.map(|p| Point {
-                                x: smaller(p.x),
-                                y: smaller(p.y),
-                                ..*p
-                            }));
-                        })
+                let begin = samples.edges.len();
+                match before.and_then(|b| b.same(i, item, first)) {
+                    Some(edges) => samples.edges.extend_from_slice(edges),
+                    None => {
+                        let placement = Placement::new(camera, &item.affine);
+                        projected.clear();
+                        projected.add(&item.mesh, &placement, &lens);
+                        let vertices = projected.mesh(0);
+                        whole &= vertices.whole;
+                        if vertices.outside(camera) {
+                        } else if vertices.whole {
+                            let back = back_of(&item.mesh, &placement, true);
+                            samples.add_mesh(&item.mesh, &vertices, back, first, drawn);
+                        } else {
+                            samples.add_cut(&item.mesh, &placement, camera, &vertices);
+                        }
                     }
                 }
-                whole &= vertices.whole;
-                first += vertices.len() as u32;
+                let (mesh, affine) = (Arc::clone(&item.mesh), item.affine);
+                let edges = begin..samples.edges.len();
+                meshes.push(Followed { mesh, affine, first, edges });
+                first += item.mesh.positions.len() as u32;
             }
             let (values, crossings) = samples.count(rows);
-            let outline = whole.then_some(Outline { edges: samples.edges, crossings });
+            let Samples { edges, .. } = samples;
+            let outline = whole.then_some(Outline { camera: *camera, meshes, edges, crossings });
             Some(Fractions { values, outline })
         })
     }
@@ -152,36 +172,35 @@ pub(in crate::render) struct Edge {
     faces: i32,
     /// The indices of the ends among the vertices of all meshes; 0 if the near plane cut.
     pub vertices: [u32; 2],
+    /// The first of the rows that it crosses, and one past the last.
+    rows: [u32; 2],
 }
 
 impl Edge {
-    /// From a side that enters so many faces, from left to right, if it leads downwards.
+    /// From a side that enters so many faces, from left to right, if it leads downwards, in a
+    /// picture with so many rows.
     #[inline(always)]
-    fn new(ends: [[f64; 2]; 2], [v, w]: [u32; 2], faces: i32) -> Edge {
+    fn new(ends: [[f64; 2]; 2], [v, w]: [u32; 2], faces: i32, rows: usize) -> Edge {
         let ([from, to], vertices, faces) = match ends[0][1] > ends[1][1] {
             true => ([ends[1], ends[0]], [w, v], -faces),
             false => (ends, [v, w], faces),
         };
-        Edge { from, to, slope: (to[0] - from[0]) / (to[1] - from[1]), faces, vertices }
-    }
-
-    /// The rows that it crosses, of that many.
-    #[inline(always)]
-    fn rows(&self, most: usize) -> Range<usize> {
-        first(self.from[1], most)..first(self.to[1], most)
+        let slope = (to[0] - from[0]) / (to[1] - from[1]);
+        let rows = [from, to].map(|[_, y]| first(y, rows as f64));
+        Edge { from, to, slope, faces, vertices, rows }
     }
 
     /// Where it crosses a row.
     #[inline(always)]
-    fn at(&self, row: usize) -> f64 {
-        self.from[0] + (row as f64 - self.from[1]) * self.slope
+    fn at(&self, row: u32) -> f64 {
+        self.from[0] + (f64::from(row) - self.from[1]) * self.slope
     }
 }
 
 /// The first whole number from `v` on, at least 0 and at most `most`; 0 for NaN.
 #[inline(always)]
-fn first(v: f64, most: usize) -> usize {
-    (v.ceil().max(0.0) as usize).min(most)
+fn first(v: f64, most: f64) -> u32 {
+    v.ceil().max(0.0).min(most) as u32
 }
 
 /// A position in the picture, in samples.
@@ -253,7 +272,7 @@ impl Samples {
                     if faces != 0 {
                         let ends = side.vertices.map(|v| in_samples(&vertices.point(v)));
                         let places = side.vertices.map(|v| first + v);
-                        self.push(Edge::new(ends, places, i32::from(faces)));
+                        self.push(Edge::new(ends, places, i32::from(faces), self.rows));
                     }
                 }
             },
@@ -270,13 +289,30 @@ impl Samples {
         }
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
             let faces = if turn > 0.0 { -1 } else { 1 };
-            self.push(Edge::new([places[i], places[j]], [0; 2], faces));
+            self.push(Edge::new([places[i], places[j]], [0; 2], faces, self.rows));
         }
+    }
+
+    /// Adds those of a mesh that is not wholly beyond the near plane.
+    fn add_cut(
+        &mut self,
+        mesh: &Mesh,
+        placement: &Placement,
+        camera: &Camera,
+        vertices: &Vertices<'_>,
+    ) {
+        // Triangles that cover no pixel are left out; so in much smaller pixels.
+        let finer = camera.finer(COLUMNS as u32);
+        let smaller = |v: f64| v / COLUMNS as f64;
+        cut_triangles(mesh, placement, &finer, vertices, |triangle, _, _| {
+            let points = triangle.points.each_ref();
+            self.add(&points.map(|p| Point { x: smaller(p.x), y: smaller(p.y), ..*p }));
+        });
     }
 
     #[inline(always)]
     fn push(&mut self, edge: Edge) {
-        if !edge.rows(self.rows).is_empty() {
+        if edge.rows[0] < edge.rows[1] {
             self.edges.push(edge);
         }
     }
@@ -288,9 +324,9 @@ impl Samples {
         begins.clear();
         begins.resize(self.rows + 2, 0);
         for edge in &self.edges {
-            let rows = edge.rows(self.rows);
-            begins[rows.start + 1] = begins[rows.start + 1].wrapping_add(1);
-            begins[rows.end + 1] = begins[rows.end + 1].wrapping_sub(1);
+            let [begin, end] = edge.rows.map(|row| row as usize + 1);
+            begins[begin] = begins[begin].wrapping_add(1);
+            begins[end] = begins[end].wrapping_sub(1);
         }
         let (mut here, mut sum) = (0u32, 0u32);
         for begin in begins.iter_mut() {
@@ -300,12 +336,13 @@ impl Samples {
         }
         all.clear();
         all.resize(sum as usize, 0);
+        let most = (self.width * COLUMNS) as f64;
         for (i, edge) in (0u64..).zip(&self.edges) {
-            for row in edge.rows(self.rows) {
-                let column = first(edge.at(row), self.width * COLUMNS) as u64;
-                let faces = (edge.faces + NO_FACES) as u64;
-                let next = &mut begins[row + 1];
-                all[*next as usize] = (column << EDGE_BITS | i) << FACES_BITS | faces;
+            let [begin, end] = edge.rows;
+            let own = i << FACES_BITS | (edge.faces + NO_FACES) as u64;
+            for (row, next) in (begin..end).zip(&mut begins[begin as usize + 1..]) {
+                let column = u64::from(first(edge.at(row), most));
+                all[*next as usize] = column << (EDGE_BITS + FACES_BITS) | own;
                 *next += 1;
             }
         }
@@ -379,7 +416,7 @@ fn add_between(counts: &mut [u16], begin: usize, end: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::Affine;
+    use crate::render::pixels::project::project;
     use crate::render::testing::{cuboid, sphere};
     use crate::render::{Channels, View};
     use glam::{DVec3, Vec3};
@@ -439,9 +476,41 @@ mod tests {
     }
 
     #[test]
+    fn what_stays_is_taken_from_before() {
+        let camera = Camera::default_for(40, 30);
+        let at = |x: f64| Affine::new(DVec3::new(x, 0.1, 0.2), DVec3::splat(0.3), DVec3::ONE);
+        let (ball, block) = (sphere(24, 12), cuboid(Vec3::new(1.4, 1.0, 0.8)).placed(at(0.4)));
+        let scene = |x: f64| Solid::group(&[ball.placed(at(x)), block.clone()]);
+        let before = Fractions::of(&scene(-0.5), &camera, None).unwrap();
+        let gain: Vec<f64> = (0..camera.pixels()).map(|i| (i % 7) as f64 - 2.0).collect();
+        for x in [-0.5, -0.3, 3.0, 90.0] {
+            let solid = scene(x);
+            let [fresh, next] = [None, Some(&before)].map(|b| Fractions::of(&solid, &camera, b));
+            let (fresh, next) = (fresh.unwrap(), next.unwrap());
+            assert_eq!(fresh.values, next.values);
+            assert_eq!(fresh.vjp(&solid, &camera, &gain), next.vjp(&solid, &camera, &gain));
+            let outline = before.outline.as_ref().unwrap();
+            let kept: Vec<bool> = solid
+                .instances()
+                .iter()
+                .enumerate()
+                .map(|(i, item)| {
+                    let first = next.outline.as_ref().unwrap().meshes[i].first;
+                    outline.same(i, item, first).is_some()
+                })
+                .collect();
+            assert_eq!(kept, [x == -0.5, true]);
+        }
+        let other = Camera::default_for(40, 40);
+        let [fresh, next] =
+            [None, Some(&before)].map(|b| Fractions::of(&scene(-0.5), &other, b).unwrap().values);
+        assert_eq!(fresh, next);
+    }
+
+    #[test]
     fn large_pictures_take_bounded_memory() {
         let camera = Camera::default_for(1200, 1200);
-        assert!(Fractions::of(&sphere(24, 12), &camera).is_none());
+        assert!(Fractions::of(&sphere(24, 12), &camera, None).is_none());
         let view = View::new(sphere(24, 12), camera);
         let mask: Vec<f32> = view.depth(1200).mask().map(|m| f32::from(u8::from(m))).collect();
         assert_eq!(view.fractions(1200)[..], mask[..]);
