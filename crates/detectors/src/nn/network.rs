@@ -121,12 +121,13 @@ impl Network {
 }
 
 /// Returns a list of this length with arbitrary values, reusing the smallest buffer that
-/// is large enough. If none is, the largest is freed, so that small ones do not pile up.
+/// is large enough, and not more than twice that. If none is, the largest is freed, so that
+/// they do not pile up.
 fn reuse(free: &mut Vec<Vec<f32>>, len: usize) -> Vec<f32> {
     let fits = free
         .iter()
         .enumerate()
-        .filter(|(_, v)| v.capacity() >= len)
+        .filter(|(_, v)| v.capacity() >= len && v.capacity() / 2 <= len)
         .min_by_key(|(_, v)| v.capacity());
     match fits.map(|(i, _)| i) {
         Some(i) => {

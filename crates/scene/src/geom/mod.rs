@@ -51,7 +51,7 @@ pub use patches::Patches;
 pub(crate) use patches::Run;
 pub use profile_path::{Profile, Wall};
 pub use revolution::{Revolution, Rim, Ring, Span};
-pub use sides::Sides;
+pub use sides::{Seams, Sides};
 pub(crate) use solid::MeshesMark;
 pub use solid::{Instance, PlacedGradient, PlacedRevolution, Solid};
 pub use sphere::{sphere, vjp_sphere};

@@ -8,7 +8,7 @@
 
 use super::Rig;
 use super::morph::{Anchor, Morph};
-use crate::geom::{GeomError, Instance, Mesh, Normals, Topology, edges, outer};
+use crate::geom::{GeomError, Instance, Mesh, Normals, Seams, Topology, edges, outer};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
 use std::sync::{Arc, LazyLock};
 
@@ -475,6 +475,11 @@ fn parts(rig: &Rig, triangles: &[[u32; 3]], influences: &[Influence]) -> Vec<Par
             vertices,
             joints: used,
         });
+    }
+    let seams = Seams::between(parts.iter().map(|p| (&p.topology.triangles[..], &p.vertices[..])));
+    let seams = Arc::new(seams);
+    for (number, part) in parts.iter_mut().enumerate() {
+        Arc::make_mut(&mut part.topology).seams = Some((Arc::clone(&seams), number));
     }
     parts
 }

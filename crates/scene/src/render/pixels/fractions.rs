@@ -8,6 +8,7 @@
 //! not matter.
 
 use crate::geom::{Affine, Instance, Mesh, Solid};
+use crate::render::canvas::{affine_bits, camera_bits};
 use crate::render::pixels::place::Point;
 use crate::render::pixels::project::{Lens, Placement, Projected, Vertices};
 use crate::render::pixels::raster::{back_of, cut_triangles};
@@ -36,7 +37,8 @@ pub(in crate::render) struct Fractions {
 
 /// Where covered samples begin and end.
 pub(in crate::render) struct Outline {
-    camera: Camera,
+    /// By its bits.
+    camera: [u64; 17],
     meshes: Vec<Followed>,
     /// The sides where faces end, in samples.
     pub edges: Vec<Edge>,
@@ -51,16 +53,20 @@ struct Followed {
     /// The index of its first vertex among all, and of its sides.
     first: u32,
     edges: Range<usize>,
+    /// For its sides of one face, which of its sides they are here; [`NONE`] if not any.
+    open: Vec<u32>,
 }
 
+const NONE: u32 = u32::MAX;
+
 impl Outline {
-    /// The sides of mesh `i`, if it was the same at the same place.
-    fn same(&self, i: usize, item: &Instance, first: u32) -> Option<&[Edge]> {
+    /// The sides of mesh `i`, and which have one face, if it was the same at the same place.
+    fn same(&self, i: usize, item: &Instance, first: u32) -> Option<(&[Edge], &[u32])> {
         let was = self.meshes.get(i)?;
-        let bits = |a: &Affine| a.0.to_cols_array().map(f64::to_bits);
         let same = Arc::ptr_eq(&was.mesh, &item.mesh) && was.first == first;
-        let same = same && bits(&was.affine) == bits(&item.affine);
-        self.edges.get(was.edges.clone()).filter(|_| same)
+        let same = same && affine_bits(&was.affine) == affine_bits(&item.affine);
+        let edges = self.edges.get(was.edges.clone()).filter(|_| same)?;
+        Some((edges, &was.open))
     }
 }
 
@@ -81,15 +87,19 @@ impl Fractions {
         if camera.pixels().saturating_mul(ROWS) > MOST {
             return None;
         }
-        let before = before.and_then(|b| b.outline.as_ref()).filter(|b| b.camera == *camera);
+        let before =
+            before.and_then(|b| b.outline.as_ref()).filter(|b| b.camera == camera_bits(camera));
         let mut samples = Samples::none(camera.width as usize, camera.height as usize);
         let (lens, mut whole, mut first) = (Lens::new(camera), true, 0);
         let mut meshes = Vec::with_capacity(solid.instances().len());
         SCRATCH.with_borrow_mut(|Scratch { projected, rows, drawn }| {
             for (i, item) in solid.instances().iter().enumerate() {
-                let begin = samples.edges.len();
+                let (begin, mut open) = (samples.edges.len(), Vec::new());
                 match before.and_then(|b| b.same(i, item, first)) {
-                    Some(edges) => samples.edges.extend_from_slice(edges),
+                    Some((edges, known)) => {
+                        samples.edges.extend_from_slice(edges);
+                        open.extend_from_slice(known);
+                    }
                     None => {
                         let placement = Placement::new(camera, &item.affine);
                         projected.clear();
@@ -99,7 +109,8 @@ impl Fractions {
                         if vertices.outside(camera) {
                         } else if vertices.whole {
                             let back = back_of(&item.mesh, &placement, true);
-                            samples.add_mesh(&item.mesh, &vertices, back, first, drawn);
+                            let found = (&mut *drawn, &mut open);
+                            samples.add_mesh(&item.mesh, &vertices, back, first, found);
                         } else {
                             samples.add_cut(&item.mesh, &placement, camera, &vertices);
                         }
@@ -107,12 +118,14 @@ impl Fractions {
                 }
                 let (mesh, affine) = (Arc::clone(&item.mesh), item.affine);
                 let edges = begin..samples.edges.len();
-                meshes.push(Followed { mesh, affine, first, edges });
+                meshes.push(Followed { mesh, affine, first, edges, open });
                 first += item.mesh.positions.len() as u32;
             }
+            samples.join(&meshes);
             let (values, crossings) = samples.count(rows);
             let Samples { edges, .. } = samples;
-            let outline = whole.then_some(Outline { camera: *camera, meshes, edges, crossings });
+            let outline =
+                whole.then_some(Outline { camera: camera_bits(camera), meshes, edges, crossings });
             Some(Fractions { values, outline })
         })
     }
@@ -190,6 +203,12 @@ impl Edge {
         Edge { from, to, slope, faces, vertices, rows }
     }
 
+    /// True if it adds, at the same place, what the other takes away.
+    fn undoes(&self, other: &Edge) -> bool {
+        let bits = |e: &Edge| [e.from, e.to].map(|p| p.map(f64::to_bits));
+        self.faces == -other.faces && bits(self) == bits(other)
+    }
+
     /// Where it crosses a row.
     #[inline(always)]
     fn at(&self, row: u32) -> f64 {
@@ -239,6 +258,8 @@ struct Samples {
     /// Of samples.
     rows: usize,
     edges: Vec<Edge>,
+    /// Which of them do not count, as their faces go on in another part of their surface.
+    joined: Vec<bool>,
 }
 
 /// Bits of the number of faces in a crossing, of which this is none, and of the side's index.
@@ -248,31 +269,41 @@ const EDGE_BITS: u32 = 32;
 
 impl Samples {
     fn none(width: usize, height: usize) -> Samples {
-        Samples { width, rows: height * ROWS, edges: Vec::with_capacity(512) }
+        let edges = Vec::with_capacity(512);
+        Samples { width, rows: height * ROWS, edges, joined: Vec::new() }
     }
 
     /// Adds the sides where faces of a mesh that is beyond the near plane end, save those of
     /// faces with the orientation `back`. `first` is the index of its first vertex among all.
+    /// Finds how faces are drawn, and which of these sides are those of one face.
     fn add_mesh(
         &mut self,
         mesh: &Mesh,
         vertices: &Vertices<'_>,
         back: f64,
         first: u32,
-        drawn: &mut Vec<i8>,
+        (drawn, open): (&mut Vec<i8>, &mut Vec<u32>),
     ) {
-        let sides = mesh.topology.sides.of(&mesh.topology.triangles);
+        let (sides, open_count) = mesh.topology.sides.of(&mesh.topology.triangles);
+        let begin = self.edges.len();
+        open.resize(open_count, NONE);
         vectorised(
             #[inline(always)]
             || {
                 faces(mesh, vertices, back, drawn);
-                for side in sides {
+                for (k, side) in sides.iter().enumerate() {
                     let [own, other] = side.faces.map(|f| drawn.get(f as usize).copied());
                     let faces = own.unwrap_or(0) - other.unwrap_or(0);
                     if faces != 0 {
                         let ends = side.vertices.map(|v| in_samples(&vertices.point(v)));
                         let places = side.vertices.map(|v| first + v);
-                        self.push(Edge::new(ends, places, i32::from(faces), self.rows));
+                        let edge = Edge::new(ends, places, i32::from(faces), self.rows);
+                        if edge.rows[0] < edge.rows[1] {
+                            if let Some(open) = open.get_mut(k) {
+                                *open = (self.edges.len() - begin) as u32;
+                            }
+                            self.edges.push(edge);
+                        }
                     }
                 }
             },
@@ -289,7 +320,10 @@ impl Samples {
         }
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
             let faces = if turn > 0.0 { -1 } else { 1 };
-            self.push(Edge::new([places[i], places[j]], [0; 2], faces, self.rows));
+            let edge = Edge::new([places[i], places[j]], [0; 2], faces, self.rows);
+            if edge.rows[0] < edge.rows[1] {
+                self.edges.push(edge);
+            }
         }
     }
 
@@ -310,10 +344,34 @@ impl Samples {
         });
     }
 
-    #[inline(always)]
-    fn push(&mut self, edge: Edge) {
-        if edge.rows[0] < edge.rows[1] {
-            self.edges.push(edge);
+    /// Finds the sides at which a part of a surface goes on in another, so that one adds what
+    /// the other takes away.
+    fn join(&mut self, meshes: &[Followed]) {
+        self.joined.clear();
+        self.joined.resize(self.edges.len(), false);
+        let mut rest = meshes;
+        while let Some(first) = rest.first() {
+            let Some((seams, 0)) = &first.mesh.topology.seams else {
+                rest = &rest[1..];
+                continue;
+            };
+            let part = |(number, m): &(usize, &Followed)| {
+                let own = m.mesh.topology.seams.as_ref();
+                own.is_some_and(|(of, n)| Arc::ptr_eq(of, seams) && n == number)
+            };
+            let (parts, after) = rest.split_at(rest.iter().enumerate().take_while(part).count());
+            rest = after;
+            for pair in &seams.0 {
+                let found = pair.map(|[part, side]| {
+                    let part = parts.get(part as usize)?;
+                    let side = *part.open.get(side as usize)?;
+                    (side != NONE).then(|| part.edges.start + side as usize)
+                });
+                let [Some(a), Some(b)] = found else { continue };
+                if self.edges[a].undoes(&self.edges[b]) {
+                    (self.joined[a], self.joined[b]) = (true, true);
+                }
+            }
         }
     }
 
@@ -323,7 +381,10 @@ impl Samples {
         // How many more are crossed in a row than in the one before it, then the sums.
         begins.clear();
         begins.resize(self.rows + 2, 0);
-        for edge in &self.edges {
+        for (edge, joined) in self.edges.iter().zip(&self.joined) {
+            if *joined {
+                continue;
+            }
             let [begin, end] = edge.rows.map(|row| row as usize + 1);
             begins[begin] = begins[begin].wrapping_add(1);
             begins[end] = begins[end].wrapping_sub(1);
@@ -337,7 +398,10 @@ impl Samples {
         all.clear();
         all.resize(sum as usize, 0);
         let most = (self.width * COLUMNS) as f64;
-        for (i, edge) in (0u64..).zip(&self.edges) {
+        for ((i, edge), joined) in (0u64..).zip(&self.edges).zip(&self.joined) {
+            if *joined {
+                continue;
+            }
             let [begin, end] = edge.rows;
             let own = i << FACES_BITS | (edge.faces + NO_FACES) as u64;
             for (row, next) in (begin..end).zip(&mut begins[begin as usize + 1..]) {
@@ -414,139 +478,5 @@ fn add_between(counts: &mut [u16], begin: usize, end: usize) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::render::pixels::project::project;
-    use crate::render::testing::{cuboid, sphere};
-    use crate::render::{Channels, View};
-    use glam::{DVec3, Vec3};
-    use proptest::prelude::*;
-
-    /// Fractions from a picture with `by` times as many pixels in both directions.
-    fn by_pixels(solid: &Solid, camera: &Camera, by: u32) -> Vec<f64> {
-        let finer = camera.finer(by);
-        let frame = Frame::render(solid, &finer, Channels::Depth);
-        let mask: Vec<bool> = frame.mask().collect();
-        let (width, by) = (camera.width as usize, by as usize);
-        let count = |p: usize| {
-            let (i, j) = (p % width * by, p / width * by);
-            let row = |j: usize| (i..i + by).filter(|i| mask[j * width * by + i]).count();
-            (j..j + by).map(row).sum::<usize>() as f64 / (by * by) as f64
-        };
-        (0..camera.pixels()).map(count).collect()
-    }
-
-    fn values(samples: &Samples) -> Arc<[f32]> {
-        samples.count(&mut RowLists::default()).0
-    }
-
-    /// Fractions from all sides of all faces that are drawn.
-    fn by_faces(solid: &Solid, camera: &Camera) -> Arc<[f32]> {
-        let mut samples = Samples::none(camera.width as usize, camera.height as usize);
-        let mut projected = Projected::default();
-        project(solid, camera, &mut projected);
-        for (i, item) in solid.instances().iter().enumerate() {
-            let back = back_of(&item.mesh, &Placement::new(camera, &item.affine), true);
-            for corners in &item.mesh.topology.triangles {
-                let points = corners.map(|v| projected.mesh(i).point(v));
-                if clockwise(&points) * back <= 0.0 {
-                    samples.add(&points);
-                }
-            }
-        }
-        values(&samples)
-    }
-
-    #[test]
-    fn triangles_that_share_edges_lose_no_sample_between_them() {
-        let mut samples = Samples::none(7, 5);
-        let point = |x: f64, y: f64| Point { x, y, nearness: 1.0 };
-        let middle = point(3.137, 2.211);
-        let around = [(-1.0, -2.0), (3.3, -2.5), (9.0, -1.0), (8.0, 6.5), (2.1, 7.0), (-3.0, 5.5)];
-        let around = around.map(|(x, y)| point(x, y));
-        for i in 0..6 {
-            samples.add(&[around[i], middle, around[(i + 1) % 6]]);
-        }
-        assert!(values(&samples).iter().all(|f| *f == 1.0));
-        let mut nothing = Samples::none(7, 5);
-        nothing.add(&[point(f64::NAN, 1.0), point(2.0, 2.0), point(1.0, 4.0)]);
-        nothing.add(&[point(1.0, 1.0), point(2.0, 1.0), point(5.0, 1.0)]);
-        nothing.add(&[point(1e300, 1.0), point(1e300, 3.0), point(2e300, 2.0)]);
-        assert!(values(&nothing).iter().all(|f| *f == 0.0));
-    }
-
-    #[test]
-    fn what_stays_is_taken_from_before() {
-        let camera = Camera::default_for(40, 30);
-        let at = |x: f64| Affine::new(DVec3::new(x, 0.1, 0.2), DVec3::splat(0.3), DVec3::ONE);
-        let (ball, block) = (sphere(24, 12), cuboid(Vec3::new(1.4, 1.0, 0.8)).placed(at(0.4)));
-        let scene = |x: f64| Solid::group(&[ball.placed(at(x)), block.clone()]);
-        let before = Fractions::of(&scene(-0.5), &camera, None).unwrap();
-        let gain: Vec<f64> = (0..camera.pixels()).map(|i| (i % 7) as f64 - 2.0).collect();
-        for x in [-0.5, -0.3, 3.0, 90.0] {
-            let solid = scene(x);
-            let [fresh, next] = [None, Some(&before)].map(|b| Fractions::of(&solid, &camera, b));
-            let (fresh, next) = (fresh.unwrap(), next.unwrap());
-            assert_eq!(fresh.values, next.values);
-            assert_eq!(fresh.vjp(&solid, &camera, &gain), next.vjp(&solid, &camera, &gain));
-            let outline = before.outline.as_ref().unwrap();
-            let kept: Vec<bool> = solid
-                .instances()
-                .iter()
-                .enumerate()
-                .map(|(i, item)| {
-                    let first = next.outline.as_ref().unwrap().meshes[i].first;
-                    outline.same(i, item, first).is_some()
-                })
-                .collect();
-            assert_eq!(kept, [x == -0.5, true]);
-        }
-        let other = Camera::default_for(40, 40);
-        let [fresh, next] =
-            [None, Some(&before)].map(|b| Fractions::of(&scene(-0.5), &other, b).unwrap().values);
-        assert_eq!(fresh, next);
-    }
-
-    #[test]
-    fn large_pictures_take_bounded_memory() {
-        let camera = Camera::default_for(1200, 1200);
-        assert!(Fractions::of(&sphere(24, 12), &camera, None).is_none());
-        let view = View::new(sphere(24, 12), camera);
-        let mask: Vec<f32> = view.depth(1200).mask().map(|m| f32::from(u8::from(m))).collect();
-        assert_eq!(view.fractions(1200)[..], mask[..]);
-        assert!(view.vjp_fractions(1200, &vec![1.0; 1200 * 1200]).iter().any(|g| g.x != 0.0));
-    }
-
-    proptest! {
-        #[test]
-        fn fractions_are_those_of_a_finer_picture(
-            place in prop::array::uniform3(-1.2f64..1.2),
-            turn in prop::array::uniform3(-3.0f64..3.0),
-            distance in prop_oneof![Just(0.0), Just(6.9), Just(7.6)],
-        ) {
-            let camera = Camera::default_for(20, 15);
-            let by = Affine::new(
-                DVec3::from(place) + distance * DVec3::Z, DVec3::from(turn), DVec3::ONE);
-            for solid in [sphere(24, 12), cuboid(Vec3::new(1.4, 1.0, 0.8))] {
-                let solid = solid.placed(by);
-                let own = View::new(solid.clone(), camera).fractions(20);
-                if distance == 0.0 {
-                    prop_assert_eq!(&own, &by_faces(&solid, &camera));
-                    let mirror = Affine::new(DVec3::ZERO, DVec3::ZERO, DVec3::new(-1.0, 1.0, 1.0));
-                    let mirrored = solid.placed(mirror);
-                    let other = View::new(mirrored.clone(), camera).fractions(20);
-                    prop_assert_eq!(&other, &by_faces(&mirrored, &camera));
-                    let far = other.chunks(20).flat_map(|row| row.iter().rev()).zip(own.iter());
-                    let far = far.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-                    prop_assert!(far < 0.02, "{far}");
-                }
-                let finer = by_pixels(&solid, &camera, 32);
-                let far = own.iter().zip(&finer).map(|(a, b)| (f64::from(*a) - b).abs());
-                let worst = far.fold(0.0, f64::max);
-                // Rows of samples are a quarter of a pixel high. Along a straight edge all differences
-                // may have one sign, so those of whole pictures have no lower bound.
-                prop_assert!(worst <= 0.13, "{worst}");
-            }
-        }
-    }
-}
+#[path = "fractions_tests.rs"]
+mod tests;
