@@ -314,8 +314,7 @@ impl Samples {
     fn add(&mut self, points: &[Point; 3]) {
         let turn = clockwise(points);
         let places = points.each_ref().map(in_samples);
-        // Written so that it is true for NaN.
-        if !(turn.abs() < f64::INFINITY) {
+        if !turn.is_finite() {
             return;
         }
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
