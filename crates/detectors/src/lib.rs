@@ -8,4 +8,5 @@ pub mod boxes;
 pub mod nn;
 pub mod objects;
 pub mod people;
+mod shared;
 mod weights;

@@ -181,7 +181,7 @@ fn pictures_of_another_mesh_and_placement() {
     // A change of one field of the mesh itself.
     let fields: [fn(&mut Mesh); 4] = [
         |m| m.positions[40].x += 0.2,
-        |m| m.normals.iter_mut().for_each(|n| *n = -*n),
+        |m| m.normals = m.normals.iter().map(|n| -*n).collect(),
         |m| Arc::make_mut(&mut m.topology).triangles.truncate(60),
         |m| Arc::make_mut(&mut m.topology).encloses ^= true,
     ];

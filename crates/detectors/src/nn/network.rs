@@ -121,12 +121,13 @@ impl Network {
 }
 
 /// Returns a list of this length with arbitrary values, reusing the smallest buffer that
-/// is large enough.
+/// is large enough, and not more than twice that. If none is, the largest is freed, so that
+/// they do not pile up.
 fn reuse(free: &mut Vec<Vec<f32>>, len: usize) -> Vec<f32> {
     let fits = free
         .iter()
         .enumerate()
-        .filter(|(_, v)| v.capacity() >= len)
+        .filter(|(_, v)| v.capacity() >= len && v.capacity() / 2 <= len)
         .min_by_key(|(_, v)| v.capacity());
     match fits.map(|(i, _)| i) {
         Some(i) => {
@@ -134,6 +135,12 @@ fn reuse(free: &mut Vec<Vec<f32>>, len: usize) -> Vec<f32> {
             v.resize(len, 0.0);
             v
         }
-        None => vec![0.0; len],
+        None => {
+            let largest = (0..free.len()).max_by_key(|i| free[*i].capacity());
+            if let Some(i) = largest {
+                drop(free.swap_remove(i));
+            }
+            vec![0.0; len]
+        }
     }
 }

@@ -2,22 +2,28 @@
 //! unless others were chosen.
 
 use super::PeopleFinder;
-use std::sync::OnceLock;
+use crate::shared::Shared;
+use std::sync::{Arc, OnceLock};
 
-static CHOSEN: OnceLock<Result<PeopleFinder, String>> = OnceLock::new();
+/// `None` for the included ones.
+static CHOSEN: OnceLock<Option<Arc<PeopleFinder>>> = OnceLock::new();
+static INCLUDED: Shared<PeopleFinder> = Shared::new();
 
 /// Chooses the networks of this process; returns false if they were already chosen or
 /// used.
 pub fn choose(finder: PeopleFinder) -> bool {
-    CHOSEN.set(Ok(finder)).is_ok()
+    CHOSEN.set(Some(Arc::new(finder))).is_ok()
 }
 
-/// Returns the networks of this process.
+/// Returns the networks of this process. The included ones are read if nobody has them.
 ///
 /// # Errors
 /// If the included ones cannot be read.
-pub fn finder() -> Result<&'static PeopleFinder, &'static str> {
-    CHOSEN.get_or_init(shipped).as_ref().map_err(String::as_str)
+pub fn finder() -> Result<Arc<PeopleFinder>, String> {
+    match CHOSEN.get_or_init(|| None) {
+        Some(chosen) => Ok(Arc::clone(chosen)),
+        None => INCLUDED.get(shipped),
+    }
 }
 
 /// The files of the included detection and landmark networks.

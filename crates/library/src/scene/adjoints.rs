@@ -78,7 +78,9 @@ pub(super) fn from_points(points: &[DVec3]) -> Adjoint {
     if points.iter().all(|p| *p == DVec3::ZERO) {
         return Adjoint::Zero;
     }
-    Adjoint::Array(points.iter().flat_map(DVec3::to_array).collect())
+    let mut numbers = Vec::with_capacity(3 * points.len());
+    points.iter().for_each(|p| numbers.extend_from_slice(p.as_ref()));
+    Adjoint::Array(numbers)
 }
 
 /// Converts to the shape of a value that stands for a vector: three numbers, one number

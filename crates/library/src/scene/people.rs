@@ -98,11 +98,12 @@ impl ImageValue {
             let options =
                 FindOptions { views: key.views, most: key.most as usize, ..FindOptions::default() };
             let fault = |why: String| Fault::new(FaultKind::Other, format!("scene.people: {why}"));
-            let finder = networks::finder().map_err(|why| fault(why.into()))?;
             let objects = match key.within {
                 Some(_) => Arc::default(),
                 None => found(self, VIEWS_OF_PEOPLE)?,
             };
+            // One detector's networks after the other's: together they take more memory.
+            let finder = networks::finder().map_err(fault)?;
             let search = key.within.map_or(Search::Everywhere(&objects), Search::Within);
             let found = finder.find(photo, search, &options, 0);
             let found = found.map_err(|e| fault(e.to_string()))?;

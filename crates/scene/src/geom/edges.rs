@@ -103,7 +103,7 @@ fn build(positions: &[Vec3], triangles: &[[u32; 3]], parts: &[u16]) -> Option<Me
         });
         out.push(corners);
     }
-    let out_normals = sums.iter().map(|n| n.normalize_or(DVec3::Y).as_vec3()).collect();
+    let out_normals: Vec<Vec3> = sums.iter().map(|n| n.normalize_or(DVec3::Y).as_vec3()).collect();
     let edges = edges
         .into_iter()
         .map(|(f, c, g, crease)| Edge {

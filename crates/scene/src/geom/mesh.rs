@@ -4,7 +4,7 @@
 //! each has one normal; edges know the faces on both sides across such splits. Meshes of
 //! one shape share their [`Topology`].
 
-use super::{Bounds, Patches};
+use super::{Bounds, Normals, Patches, Seams, Sides};
 use glam::Vec3;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -131,6 +131,10 @@ pub struct Topology {
     pub encloses: bool,
     /// The triangles in small groups.
     pub patches: Patches,
+    /// The sides of the triangles.
+    pub sides: Sides,
+    /// If it is a part of a surface: where its parts meet, and the number of this one.
+    pub seams: Option<(Arc<Seams>, usize)>,
 }
 
 /// A triangle mesh.
@@ -139,7 +143,7 @@ pub struct Mesh {
     /// The vertices.
     pub positions: Vec<Vec3>,
     /// A unit normal for each vertex.
-    pub normals: Vec<Vec3>,
+    pub normals: Normals,
     /// The triangles, parts and edges.
     pub topology: Arc<Topology>,
 }
@@ -156,8 +160,8 @@ pub const MOST_PARTS: usize = u16::MAX as usize;
 
 impl Mesh {
     /// Puts a mesh together from its vertices, a unit normal for each, and the rest.
-    pub fn of(positions: Vec<Vec3>, normals: Vec<Vec3>, topology: Arc<Topology>) -> Mesh {
-        Mesh { positions, normals, topology }
+    pub fn of(positions: Vec<Vec3>, normals: impl Into<Normals>, topology: Arc<Topology>) -> Mesh {
+        Mesh { positions, normals: normals.into(), topology }
     }
 
     /// Returns the bounding box.

@@ -10,7 +10,7 @@ use super::landmark::{Landmark, unique};
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use super::revolution::Revolution;
 use super::{Affine, Bounds, Edge, Edges, GeomError, Mesh, NO_FACE, Topology, outer};
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 use std::fmt;
 use std::ops::Deref;
 use std::sync::{Arc, LazyLock, Weak};
@@ -410,10 +410,6 @@ impl Solid {
         let (mut linear, mut shift) = (DMat3::ZERO, DVec3::ZERO);
         let back = by.0.matrix3.transpose();
         let mut pull = |p: DVec3, by: &DVec3| {
-            // Most vertices are not on a contour.
-            if *by == DVec3::ZERO {
-                return DVec3::ZERO;
-            }
             linear += outer(*by, p);
             shift += *by;
             back * *by
@@ -421,7 +417,14 @@ impl Solid {
         let vertices = if by_vertex.is_empty() {
             Vec::new()
         } else {
-            self.vertices().zip(by_vertex).map(|(p, by)| pull(p, by)).collect()
+            // Places only where something depends on them.
+            let vertices =
+                self.instances.iter().flat_map(|i| i.mesh.positions.iter().map(move |p| (i, p)));
+            let vertex = |((i, p), by): ((&Instance, &Vec3), &DVec3)| match *by {
+                DVec3::ZERO => DVec3::ZERO,
+                _ => pull(i.affine.point(p.as_dvec3()), by),
+            };
+            vertices.zip(by_vertex).map(vertex).collect()
         };
         let landmarks =
             self.landmarks.iter().zip(by_landmark).map(|(l, by)| pull(l.position, by)).collect();

@@ -27,9 +27,9 @@ pub fn sphere(radius: f64, sides: u32) -> Result<Mesh, GeomError> {
     });
     let strip = Strip { points: points.collect(), parts: vec![0; rings as usize], blend: false };
     let mut mesh = revolve(&[strip], sides, false, 1);
-    for (n, p) in mesh.normals.iter_mut().zip(&mesh.positions) {
-        *n = p.as_dvec3().normalize_or(n.as_dvec3()).as_vec3();
-    }
+    let outward =
+        |(n, p): (&glam::Vec3, &glam::Vec3)| p.as_dvec3().normalize_or(n.as_dvec3()).as_vec3();
+    mesh.normals = mesh.normals.iter().zip(&mesh.positions).map(outward).collect();
     Ok(mesh)
 }
 

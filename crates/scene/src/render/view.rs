@@ -49,6 +49,8 @@ pub struct View {
     /// reads contours and another depth, contours are read from the depth.
     read: Mutex<Vec<(Channel, u32)>>,
     read_before: Vec<(Channel, u32)>,
+    /// By size, the coverage of the last view before it whose coverage was needed.
+    covered_before: Vec<(u32, Arc<Fractions>)>,
 }
 
 impl View {
@@ -62,6 +64,7 @@ impl View {
             pictures: Mutex::default(),
             read: Mutex::default(),
             read_before: Vec::new(),
+            covered_before: Vec::new(),
         }
     }
 
@@ -90,7 +93,10 @@ impl View {
         let read = previous.read.lock().unwrap_or_else(PoisonError::into_inner).clone();
         // A view whose density was not needed has no comparators.
         let read_before = if read.is_empty() { previous.read_before.clone() } else { read };
-        View { canvas: previous.canvas.for_next(), read_before, ..self }
+        let covered = previous.all_covered();
+        let covered_before =
+            if covered.is_empty() { previous.covered_before.clone() } else { covered };
+        View { canvas: previous.canvas.for_next(), read_before, covered_before, ..self }
     }
 
     /// Declares that a comparator reads a channel of the picture whose longer side has `size`
@@ -173,13 +179,25 @@ impl View {
     pub(super) fn covered(&self, size: u32) -> Arc<Fractions> {
         let draw = || {
             let (solid, camera) = (&self.solid, self.camera.scaled_to(size));
-            let samples = solid.revolution().is_none().then(|| Fractions::of(solid, &camera));
+            let before = self.covered_before.iter().find(|(at, _)| *at == size);
+            let before = before.map(|(_, fractions)| &**fractions);
+            let by_samples = || Fractions::of(solid, &camera, before);
+            let samples = solid.revolution().is_none().then(by_samples);
             Arc::new(samples.flatten().unwrap_or_else(|| {
                 let draw = |finer: &Camera| drawn_frame(solid, finer, Channels::Depth);
                 Fractions::by_pixels(&camera, draw)
             }))
         };
         Arc::clone(self.of(size).fractions.get_or_init(draw))
+    }
+
+    /// The coverage that was needed so far, by size.
+    fn all_covered(&self) -> Vec<(u32, Arc<Fractions>)> {
+        let all = self.pictures.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = |(size, pictures): &(u32, Arc<Pictures>)| {
+            pictures.fractions.get().map(|fractions| (*size, Arc::clone(fractions)))
+        };
+        all.iter().filter_map(known).collect()
     }
 
     /// The contours in the picture whose longer side has `size` pixels (0 counts as 1).

@@ -8,7 +8,7 @@
 
 use super::Rig;
 use super::morph::{Anchor, Morph};
-use crate::geom::{GeomError, Instance, Mesh, Topology, edges, outer};
+use crate::geom::{GeomError, Instance, Mesh, Normals, Seams, Topology, edges, outer};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
 use std::sync::{Arc, LazyLock};
 
@@ -64,16 +64,36 @@ pub(super) struct Skin {
     rest: Arc<LazySurface>,
 }
 
+impl Skin {
+    /// The map of a vertex from the transforms of all joints.
+    fn blended(&self, v: u32, transforms: &[Affine3A]) -> Affine3A {
+        let Influence { joints, weights } = &self.influences[v as usize];
+        match weights[0] == 1.0 {
+            true => transforms[usize::from(joints[0])],
+            false => blend(joints, weights, transforms),
+        }
+    }
+}
+
 /// The vertices at rest, and their normals.
 #[derive(Debug)]
 struct Surface {
-    positions: Vec<Vec3>,
-    normals: Vec<Vec3>,
+    positions: Arc<[Vec3]>,
+    normals: Normals,
 }
 
 impl Surface {
     fn new(positions: Vec<Vec3>, triangles: &[[u32; 3]]) -> Surface {
-        Surface { normals: edges::smooth_normals(&positions, triangles), positions }
+        let normals = edges::smooth_normals(&positions, triangles).into();
+        Surface { normals, positions: positions.into() }
+    }
+
+    /// The same for the triangles of a skin, with normals when they are needed.
+    fn of(positions: Vec<Vec3>, skin: Arc<Skin>) -> Surface {
+        let positions: Arc<[Vec3]> = positions.into();
+        let of = Arc::clone(&positions);
+        let normals = Normals::later(move || edges::smooth_normals(&of, &skin.triangles));
+        Surface { positions, normals }
     }
 }
 
@@ -278,9 +298,9 @@ impl Armature {
     ) -> Armature {
         let (before, skin) = (Arc::clone(&self.surface), Arc::clone(&self.skin));
         let surface = move || {
-            let mut positions = before.positions.clone();
+            let mut positions = before.positions.to_vec();
             change(&mut positions);
-            Surface::new(positions, &skin.triangles)
+            Surface::of(positions, skin)
         };
         Armature {
             rig: self.rig.moved(heads, tails, points),
@@ -333,24 +353,26 @@ impl Armature {
         &self.skin.parts
     }
 
-    /// Returns a part deformed by the transforms of all joints.
-    pub(super) fn skinned(&self, number: usize, transforms: &[Affine3A]) -> Instance {
-        let (rest, part): (&Surface, &Part) = (&self.surface, &self.skin.parts[number]);
-        let (mut positions, mut normals) = (Vec::with_capacity(part.vertices.len()), Vec::new());
-        normals.reserve_exact(part.vertices.len());
-        for v in &part.vertices {
-            let v = *v as usize;
-            let (p, n) = (rest.positions[v], rest.normals[v]);
-            let Influence { joints, weights } = &self.skin.influences[v];
-            let m = if weights[0] == 1.0 {
-                transforms[usize::from(joints[0])]
-            } else {
-                blend(joints, weights, transforms)
+    /// Returns a part deformed by the transforms of all joints, with normals when they are
+    /// needed.
+    pub(super) fn skinned(&self, number: usize, transforms: &Arc<[Affine3A]>) -> Instance {
+        let part = &self.skin.parts[number];
+        let rest: &[Vec3] = &self.surface.positions;
+        let place = |v: &u32| {
+            let m = self.skin.blended(*v, transforms);
+            m.transform_point3a(rest[*v as usize].into()).into()
+        };
+        let positions = part.vertices.iter().map(place).collect();
+        let (surface, skin) = (Arc::clone(&self.surface), Arc::clone(&self.skin));
+        let transforms = Arc::clone(transforms);
+        let normals = Normals::later(move || {
+            let turned = |v: &u32| {
+                let m = skin.blended(*v, &transforms);
+                let n = Vec3A::from(surface.normals[*v as usize]);
+                (cofactor(&m.matrix3) * n).normalize_or(Vec3A::Y).into()
             };
-            positions.push(m.transform_point3a(p.into()).into());
-            normals
-                .push(Vec3::from((cofactor(&m.matrix3) * Vec3A::from(n)).normalize_or(Vec3A::Y)));
-        }
+            skin.parts[number].vertices.iter().map(turned).collect()
+        });
         let mesh = Arc::new(Mesh::of(positions, normals, Arc::clone(&part.topology)));
         Instance { first_part: part.joint, ..Instance::new(mesh) }
     }
@@ -453,6 +475,11 @@ fn parts(rig: &Rig, triangles: &[[u32; 3]], influences: &[Influence]) -> Vec<Par
             vertices,
             joints: used,
         });
+    }
+    let seams = Seams::between(parts.iter().map(|p| (&p.topology.triangles[..], &p.vertices[..])));
+    let seams = Arc::new(seams);
+    for (number, part) in parts.iter_mut().enumerate() {
+        Arc::make_mut(&mut part.topology).seams = Some((Arc::clone(&seams), number));
     }
     parts
 }

@@ -15,7 +15,7 @@ pub struct Posed(Arc<Pose>);
 #[derive(Debug)]
 struct Pose {
     body: Arc<Armature>,
-    transforms: Vec<Affine3A>,
+    transforms: Arc<[Affine3A]>,
     parts: OnceLock<Vec<Instance>>,
 }
 
@@ -49,7 +49,7 @@ impl Posed {
     /// are already made are used, so that no chain of poses is kept.
     pub(super) fn new(
         body: &Arc<Armature>,
-        transforms: Vec<Affine3A>,
+        transforms: Arc<[Affine3A]>,
         before: Option<&Posed>,
     ) -> (Posed, impl FnOnce() -> Vec<Instance> + Send + 'static) {
         let is_made = |b: &&Posed| Arc::ptr_eq(&b.0.body, body) && b.0.parts.get().is_some();
@@ -84,7 +84,7 @@ impl Armature {
         before: Option<&Posed>,
     ) -> Result<(Solid, Posed), GeomError> {
         let transforms: Arc<[DAffine3]> = self.rig().transforms(pose, rules)?.into();
-        let single: Vec<Affine3A> = transforms.iter().map(DAffine3::as_affine3a).collect();
+        let single: Arc<[Affine3A]> = transforms.iter().map(DAffine3::as_affine3a).collect();
         if !single.iter().all(|t| t.is_finite()) {
             return Err(GeomError::domain("the pose moves the body too far away"));
         }

@@ -124,11 +124,11 @@ impl Area {
     }
 }
 
-pub(super) fn affine_bits(affine: &Affine) -> [u64; 12] {
+pub(in crate::render) fn affine_bits(affine: &Affine) -> [u64; 12] {
     affine.0.to_cols_array().map(f64::to_bits)
 }
 
-pub(super) fn camera_bits(camera: &Camera) -> [u64; 17] {
+pub(in crate::render) fn camera_bits(camera: &Camera) -> [u64; 17] {
     let (kind, scale, cx, cy) = match camera.projection {
         Projection::Pinhole { focal_px, cx, cy } => (0, focal_px, cx, cy),
         Projection::Orthographic { units_per_pixel, cx, cy } => (1, units_per_pixel, cx, cy),

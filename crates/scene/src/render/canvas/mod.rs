@@ -16,10 +16,11 @@ mod meshes;
 mod picture;
 mod static_layer;
 
-use self::layer::{Shows, Tools, camera_bits};
+use self::layer::{Shows, Tools};
 use self::picture::IncrementalImage;
 use super::{Camera, ContourChange, Contours};
 use crate::geom::Solid;
+pub(super) use layer::{affine_bits, camera_bits};
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
 /// The number of pictures that a canvas keeps: several cameras or sizes, with contours or with

@@ -251,7 +251,7 @@ impl Batch {
     ) {
         self.corners[i] = corners;
         for (k, v) in corners.into_iter().enumerate() {
-            let [p, n] = [&mesh.positions, &mesh.normals]
+            let [p, n] = [&mesh.positions[..], &mesh.normals]
                 .map(|list| list.get(v as usize).copied().unwrap_or_default().as_dvec3());
             for axis in 0..3 {
                 (self.positions[k][axis][i], self.normals[k][axis][i]) = (p[axis], n[axis]);

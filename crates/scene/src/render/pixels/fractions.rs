@@ -1,63 +1,133 @@
 //! The fraction of every pixel that a solid covers.
 //!
-//! Pixels are sampled in rows of 64, a word for each, so a triangle's row of samples is set a
-//! word at a time. Triangles that share an edge find the same place for it in each row, so no
-//! sample is lost between them. What hides what does not matter.
+//! Pixels are sampled in rows of [`COLUMNS`]. From the left end of a row, the sides of faces that
+//! are crossed tell how many faces there are at each sample: a side that enters its face adds
+//! one, a side that leaves it takes one away. A side between two faces that are both drawn does
+//! neither, so only the sides where drawn faces end are followed. Faces that share a side find
+//! the same place for it in each row, so no sample is lost between them. What hides what does
+//! not matter.
 
-use crate::geom::{Mesh, Solid};
+use crate::geom::{Affine, Instance, Mesh, Solid};
+use crate::render::canvas::{affine_bits, camera_bits};
 use crate::render::pixels::place::Point;
-use crate::render::pixels::project::{Placement, Projected, Vertices, project};
+use crate::render::pixels::project::{Lens, Placement, Projected, Vertices};
 use crate::render::pixels::raster::{back_of, cut_triangles};
 use crate::render::simd::vectorised;
 use crate::render::{Camera, Frame};
+use std::cell::RefCell;
 use std::ops::Range;
 use std::sync::Arc;
 
 /// Samples in a row of a pixel, and rows of them.
-pub(in crate::render) const COLUMNS: usize = u64::BITS as usize;
+pub(in crate::render) const COLUMNS: usize = 64;
 pub(in crate::render) const ROWS: usize = 4;
 
 /// Columns and rows of finer pixels in one, where there are no samples.
 const FINER: u32 = 8;
-/// The most pixels of a finer picture, and the most words of samples.
+/// The most pixels of a finer picture, and the most of samples' rows within a pixel.
 const MOST: usize = 1 << 22;
 
 /// The coverage of each pixel by a solid.
 pub(in crate::render) struct Fractions {
     /// The fraction of every pixel, 0 to 1, row by row.
     pub values: Arc<[f32]>,
-    /// `None` if the values are from a finer picture.
-    pub samples: Option<Samples>,
-    pub projected: Projected,
+    /// `None` if the values are from a finer picture, or if the near plane cuts a mesh.
+    pub outline: Option<Outline>,
+}
+
+/// Where covered samples begin and end.
+pub(in crate::render) struct Outline {
+    /// By its bits.
+    camera: [u64; 17],
+    meshes: Vec<Followed>,
+    /// The sides where faces end, in samples.
+    pub edges: Vec<Edge>,
+    /// The crossings between a sample that is covered and one that is not, row by row.
+    pub crossings: Vec<Crossing>,
+}
+
+/// A mesh whose sides were followed.
+struct Followed {
+    mesh: Arc<Mesh>,
+    affine: Affine,
+    /// The index of its first vertex among all, and of its sides.
+    first: u32,
+    edges: Range<usize>,
+    /// For its sides of one face, which of its sides they are here; [`NONE`] if not any.
+    open: Vec<u32>,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Outline {
+    /// The sides of mesh `i`, and which have one face, if it was the same at the same place.
+    fn same(&self, i: usize, item: &Instance, first: u32) -> Option<(&[Edge], &[u32])> {
+        let was = self.meshes.get(i)?;
+        let same = Arc::ptr_eq(&was.mesh, &item.mesh) && was.first == first;
+        let same = same && affine_bits(&was.affine) == affine_bits(&item.affine);
+        let edges = self.edges.get(was.edges.clone()).filter(|_| same)?;
+        Some((edges, &was.open))
+    }
+}
+
+/// A side that separates a sample from the one to the left of it.
+pub(in crate::render) struct Crossing {
+    pub row: u32,
+    pub column: u32,
+    /// The index of the side.
+    pub edge: u32,
+    /// True if the sample to the right is the covered one.
+    pub enters: bool,
 }
 
 impl Fractions {
-    /// Those of the meshes of a solid, unless the picture is too large.
-    pub fn of(solid: &Solid, camera: &Camera) -> Option<Fractions> {
+    /// Those of the meshes of a solid, unless the picture is too large. The sides of meshes that
+    /// are where they were `before` are taken from there.
+    pub fn of(solid: &Solid, camera: &Camera, before: Option<&Fractions>) -> Option<Fractions> {
         if camera.pixels().saturating_mul(ROWS) > MOST {
             return None;
         }
-        let mut projected = Projected::default();
-        project(solid, camera, &mut projected);
+        let before =
+            before.and_then(|b| b.outline.as_ref()).filter(|b| b.camera == camera_bits(camera));
         let mut samples = Samples::none(camera.width as usize, camera.height as usize);
-        // Of triangles that the near plane cuts, those that cover no pixel are left out; so in
-        // much smaller pixels.
-        let finer = camera.finer(COLUMNS as u32);
-        for (i, item) in solid.instances().iter().enumerate() {
-            let (mesh, vertices) = (&item.mesh, projected.mesh(i));
-            let placement = Placement::new(camera, &item.affine);
-            match vertices.whole {
-                _ if vertices.outside(camera) => {}
-                true => samples.add_mesh(mesh, &vertices, back_of(mesh, &placement, true)),
-                false => cut_triangles(mesh, &placement, &finer, &vertices, |triangle, _, _| {
-                    let smaller = |v: f64| v / COLUMNS as f64;
-                    let points = triangle.points.each_ref();
-                    samples.add(&points.map(|p| Point { x: smaller(p.x), y: smaller(p.y), ..*p }));
-                }),
+        let (lens, mut whole, mut first) = (Lens::new(camera), true, 0);
+        let mut meshes = Vec::with_capacity(solid.instances().len());
+        SCRATCH.with_borrow_mut(|Scratch { projected, rows, drawn }| {
+            for (i, item) in solid.instances().iter().enumerate() {
+                let (begin, mut open) = (samples.edges.len(), Vec::new());
+                match before.and_then(|b| b.same(i, item, first)) {
+                    Some((edges, known)) => {
+                        samples.edges.extend_from_slice(edges);
+                        open.extend_from_slice(known);
+                    }
+                    None => {
+                        let placement = Placement::new(camera, &item.affine);
+                        projected.clear();
+                        projected.add(&item.mesh, &placement, &lens);
+                        let vertices = projected.mesh(0);
+                        whole &= vertices.whole;
+                        if vertices.outside(camera) {
+                        } else if vertices.whole {
+                            let back = back_of(&item.mesh, &placement, true);
+                            let found = (&mut *drawn, &mut open);
+                            samples.add_mesh(&item.mesh, &vertices, back, first, found);
+                        } else {
+                            samples.add_cut(&item.mesh, &placement, camera, &vertices);
+                        }
+                    }
+                }
+                let (mesh, affine) = (Arc::clone(&item.mesh), item.affine);
+                let edges = begin..samples.edges.len();
+                meshes.push(Followed { mesh, affine, first, edges, open });
+                first += item.mesh.positions.len() as u32;
             }
-        }
-        let values = samples.fractions().into();
-        Some(Fractions { values, samples: Some(samples), projected })
+            samples.join(&meshes);
+            let (values, crossings) = samples.count(rows);
+            let Samples { edges, .. } = samples;
+            let outline =
+                whole.then_some(Outline { camera: camera_bits(camera), meshes, edges, crossings });
+            Some(Fractions { values, outline })
+        })
     }
 
     /// Those in a finer picture, drawn by `draw`: for what has no mesh, and for pictures so
@@ -79,221 +149,333 @@ impl Fractions {
             }
         }
         let values = counts.into_iter().map(|count| count as f32 / (by * by) as f32).collect();
-        Fractions { values, samples: None, projected: Projected::default() }
+        Fractions { values, outline: None }
     }
 }
 
-/// Which samples are covered: a word for each pixel, in each row of samples.
-pub(in crate::render) struct Samples {
-    /// In pixels.
-    pub width: usize,
-    /// Of samples.
-    pub rows: usize,
-    pub words: Vec<u64>,
+thread_local! {
+    static SCRATCH: RefCell<Scratch> = RefCell::default();
 }
 
-/// An edge from its upper to its lower end, in samples: whole numbers are their places.
+/// Buffers that are reused.
+#[derive(Default)]
+struct Scratch {
+    projected: Projected,
+    rows: RowLists,
+    /// For each face of a mesh how it is drawn; see [`faces`].
+    drawn: Vec<i8>,
+}
+
+/// What is crossed in each row of samples.
+#[derive(Default)]
+struct RowLists {
+    /// Where each row's crossings begin among all of them.
+    begins: Vec<u32>,
+    all: Vec<u64>,
+}
+
+/// A side from its upper to its lower end, in samples: whole numbers are their places.
 #[derive(Clone, Copy)]
 pub(in crate::render) struct Edge {
     pub from: [f64; 2],
     pub to: [f64; 2],
     /// Of x by y.
     pub slope: f64,
+    /// Those that are entered less those that are left, from left to right.
+    faces: i32,
+    /// The indices of the ends among the vertices of all meshes; 0 if the near plane cut.
+    pub vertices: [u32; 2],
+    /// The first of the rows that it crosses, and one past the last.
+    rows: [u32; 2],
 }
 
 impl Edge {
+    /// From a side that enters so many faces, from left to right, if it leads downwards, in a
+    /// picture with so many rows.
     #[inline(always)]
-    pub fn new(from: [f64; 2], to: [f64; 2]) -> Edge {
-        Edge { from, to, slope: (to[0] - from[0]) / (to[1] - from[1]) }
+    fn new(ends: [[f64; 2]; 2], [v, w]: [u32; 2], faces: i32, rows: usize) -> Edge {
+        let ([from, to], vertices, faces) = match ends[0][1] > ends[1][1] {
+            true => ([ends[1], ends[0]], [w, v], -faces),
+            false => (ends, [v, w], faces),
+        };
+        let slope = (to[0] - from[0]) / (to[1] - from[1]);
+        let rows = [from, to].map(|[_, y]| first(y, rows as f64));
+        Edge { from, to, slope, faces, vertices, rows }
     }
 
-    /// The rows that it crosses, of that many.
-    #[inline(always)]
-    pub fn rows(&self, most: usize) -> Range<usize> {
-        first(self.from[1], most)..first(self.to[1], most)
+    /// True if it adds, at the same place, what the other takes away.
+    fn undoes(&self, other: &Edge) -> bool {
+        let bits = |e: &Edge| [e.from, e.to].map(|p| p.map(f64::to_bits));
+        self.faces == -other.faces && bits(self) == bits(other)
     }
 
     /// Where it crosses a row.
     #[inline(always)]
-    pub fn at(&self, row: usize) -> f64 {
-        self.from[0] + (row as f64 - self.from[1]) * self.slope
+    fn at(&self, row: u32) -> f64 {
+        self.from[0] + (f64::from(row) - self.from[1]) * self.slope
     }
 }
 
 /// The first whole number from `v` on, at least 0 and at most `most`; 0 for NaN.
 #[inline(always)]
-pub(in crate::render) fn first(v: f64, most: usize) -> usize {
-    (v.ceil().max(0.0) as usize).min(most)
+fn first(v: f64, most: f64) -> u32 {
+    v.ceil().max(0.0).min(most) as u32
 }
 
 /// A position in the picture, in samples.
 #[inline(always)]
-pub(in crate::render) fn in_samples(p: &Point) -> [f64; 2] {
+fn in_samples(p: &Point) -> [f64; 2] {
     [p.x * COLUMNS as f64 - 0.5, p.y * ROWS as f64 - 0.5]
 }
 
-/// True if a triangle has the orientation `back`, as in [`back_of`].
+/// The double area of a triangle in the picture, above 0 where the corners follow each other
+/// clockwise.
 #[inline(always)]
-pub(in crate::render) fn is_back([a, b, c]: &[Point; 3], back: f64) -> bool {
-    ((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)) * back > 0.0
+fn clockwise([a, b, c]: &[Point; 3]) -> f64 {
+    (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
 }
+
+/// How the faces of a mesh are drawn: 1 counter-clockwise, -1 clockwise, 0 not, as it has the
+/// orientation `back` of [`back_of`]. After the last there is a 0, for no face.
+#[inline(always)]
+fn faces(mesh: &Mesh, vertices: &Vertices<'_>, back: f64, drawn: &mut Vec<i8>) {
+    let triangles = &mesh.topology.triangles;
+    drawn.resize(triangles.len() + 1, 0);
+    for (drawn, corners) in drawn.iter_mut().zip(triangles) {
+        let turn = clockwise(&corners.map(|v| vertices.point(v)));
+        *drawn = match back == 0.0 {
+            true => 1 - 2 * i8::from(turn > 0.0),
+            false => i8::from(turn * back <= 0.0) * if back > 0.0 { 1 } else { -1 },
+        };
+    }
+    drawn[triangles.len()] = 0;
+}
+
+/// A picture's rows of samples, and the sides that cross them.
+struct Samples {
+    /// In pixels.
+    width: usize,
+    /// Of samples.
+    rows: usize,
+    edges: Vec<Edge>,
+    /// Which of them do not count, as their faces go on in another part of their surface.
+    joined: Vec<bool>,
+}
+
+/// Bits of the number of faces in a crossing, of which this is none, and of the side's index.
+const FACES_BITS: u32 = 4;
+const NO_FACES: i32 = 1 << (FACES_BITS - 1);
+const EDGE_BITS: u32 = 32;
 
 impl Samples {
     fn none(width: usize, height: usize) -> Samples {
-        Samples { width, rows: height * ROWS, words: vec![0; width * height * ROWS] }
+        let edges = Vec::with_capacity(512);
+        Samples { width, rows: height * ROWS, edges, joined: Vec::new() }
     }
 
-    /// Adds the triangles of a mesh that is beyond the near plane, save those with the
-    /// orientation `back`.
-    fn add_mesh(&mut self, mesh: &Mesh, vertices: &Vertices<'_>, back: f64) {
+    /// Adds the sides where faces of a mesh that is beyond the near plane end, save those of
+    /// faces with the orientation `back`. `first` is the index of its first vertex among all.
+    /// Finds how faces are drawn, and which of these sides are those of one face.
+    fn add_mesh(
+        &mut self,
+        mesh: &Mesh,
+        vertices: &Vertices<'_>,
+        back: f64,
+        first: u32,
+        (drawn, open): (&mut Vec<i8>, &mut Vec<u32>),
+    ) {
+        let (sides, open_count) = mesh.topology.sides.of(&mesh.topology.triangles);
+        let begin = self.edges.len();
+        open.resize(open_count, NONE);
         vectorised(
             #[inline(always)]
             || {
-                for corners in &mesh.topology.triangles {
-                    let points = corners.map(|v| vertices.point(v));
-                    if !is_back(&points, back) {
-                        self.add(&points);
+                faces(mesh, vertices, back, drawn);
+                for (k, side) in sides.iter().enumerate() {
+                    let [own, other] = side.faces.map(|f| drawn.get(f as usize).copied());
+                    let faces = own.unwrap_or(0) - other.unwrap_or(0);
+                    if faces != 0 {
+                        let ends = side.vertices.map(|v| in_samples(&vertices.point(v)));
+                        let places = side.vertices.map(|v| first + v);
+                        let edge = Edge::new(ends, places, i32::from(faces), self.rows);
+                        if edge.rows[0] < edge.rows[1] {
+                            if let Some(open) = open.get_mut(k) {
+                                *open = (self.edges.len() - begin) as u32;
+                            }
+                            self.edges.push(edge);
+                        }
                     }
                 }
             },
         );
     }
 
-    /// Adds a triangle in the picture.
-    #[inline(always)]
+    /// Adds a triangle in the picture, whichever way it turns.
     fn add(&mut self, points: &[Point; 3]) {
-        let [mut a, mut b, mut c] = points.each_ref().map(in_samples);
-        if a[1] > b[1] {
-            std::mem::swap(&mut a, &mut b);
-        }
-        if b[1] > c[1] {
-            std::mem::swap(&mut b, &mut c);
-        }
-        if a[1] > b[1] {
-            std::mem::swap(&mut a, &mut b);
-        }
-        let long = Edge::new(a, c);
-        for short in [Edge::new(a, b), Edge::new(b, c)] {
-            for row in short.rows(self.rows) {
-                let (x, y) = (long.at(row), short.at(row));
-                self.add_between(row, if x < y { [x, y] } else { [y, x] });
-            }
-        }
-    }
-
-    /// Adds the samples of a row between two places.
-    #[inline(always)]
-    fn add_between(&mut self, row: usize, ends: [f64; 2]) {
-        let [left, right] = ends.map(|x| first(x, self.width * COLUMNS));
-        if left >= right {
+        let turn = clockwise(points);
+        let places = points.each_ref().map(in_samples);
+        if !turn.is_finite() {
             return;
         }
-        let start = row * self.width;
-        let ends = start + left / COLUMNS..=start + (right - 1) / COLUMNS;
-        let head = u64::MAX << (left % COLUMNS);
-        let tail = u64::MAX >> (COLUMNS - 1 - (right - 1) % COLUMNS);
-        match self.words.get_mut(ends) {
-            None | Some([]) => {}
-            Some([only]) => *only |= head & tail,
-            Some([first, between @ .., last]) => {
-                *first |= head;
-                between.fill(u64::MAX);
-                *last |= tail;
+        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+            let faces = if turn > 0.0 { -1 } else { 1 };
+            let edge = Edge::new([places[i], places[j]], [0; 2], faces, self.rows);
+            if edge.rows[0] < edge.rows[1] {
+                self.edges.push(edge);
             }
         }
     }
 
-    /// True if a sample is covered.
-    #[inline(always)]
-    pub fn has(&self, row: usize, column: usize) -> bool {
-        let word = self.words.get(row * self.width + column / COLUMNS);
-        word.is_some_and(|word| word >> (column % COLUMNS) & 1 == 1)
+    /// Adds those of a mesh that is not wholly beyond the near plane.
+    fn add_cut(
+        &mut self,
+        mesh: &Mesh,
+        placement: &Placement,
+        camera: &Camera,
+        vertices: &Vertices<'_>,
+    ) {
+        // Triangles that cover no pixel are left out; so in much smaller pixels.
+        let finer = camera.finer(COLUMNS as u32);
+        let smaller = |v: f64| v / COLUMNS as f64;
+        cut_triangles(mesh, placement, &finer, vertices, |triangle, _, _| {
+            let points = triangle.points.each_ref();
+            self.add(&points.map(|p| Point { x: smaller(p.x), y: smaller(p.y), ..*p }));
+        });
     }
 
-    fn fractions(&self) -> Vec<f32> {
-        let width = self.width.max(1);
-        let mut out = Vec::with_capacity(self.words.len() / ROWS);
-        for rows in self.words.chunks(width * ROWS) {
-            let count = |i: usize| -> u32 {
-                rows.iter().skip(i).step_by(width).map(|word| word.count_ones()).sum()
+    /// Finds the sides at which a part of a surface goes on in another, so that one adds what
+    /// the other takes away.
+    fn join(&mut self, meshes: &[Followed]) {
+        self.joined.clear();
+        self.joined.resize(self.edges.len(), false);
+        let mut rest = meshes;
+        while let Some(first) = rest.first() {
+            let Some((seams, 0)) = &first.mesh.topology.seams else {
+                rest = &rest[1..];
+                continue;
             };
-            out.extend((0..width).map(|i| count(i) as f32 / (COLUMNS * ROWS) as f32));
+            let part = |(number, m): &(usize, &Followed)| {
+                let own = m.mesh.topology.seams.as_ref();
+                own.is_some_and(|(of, n)| Arc::ptr_eq(of, seams) && n == number)
+            };
+            let (parts, after) = rest.split_at(rest.iter().enumerate().take_while(part).count());
+            rest = after;
+            for pair in &seams.0 {
+                let found = pair.map(|[part, side]| {
+                    let part = parts.get(part as usize)?;
+                    let side = *part.open.get(side as usize)?;
+                    (side != NONE).then(|| part.edges.start + side as usize)
+                });
+                let [Some(a), Some(b)] = found else { continue };
+                if self.edges[a].undoes(&self.edges[b]) {
+                    (self.joined[a], self.joined[b]) = (true, true);
+                }
+            }
         }
-        out
+    }
+
+    /// Puts in order what is crossed in each row.
+    #[inline(always)]
+    fn sort(&self, RowLists { begins, all }: &mut RowLists) {
+        // How many more are crossed in a row than in the one before it, then the sums.
+        begins.clear();
+        begins.resize(self.rows + 2, 0);
+        for (edge, joined) in self.edges.iter().zip(&self.joined) {
+            if *joined {
+                continue;
+            }
+            let [begin, end] = edge.rows.map(|row| row as usize + 1);
+            begins[begin] = begins[begin].wrapping_add(1);
+            begins[end] = begins[end].wrapping_sub(1);
+        }
+        let (mut here, mut sum) = (0u32, 0u32);
+        for begin in begins.iter_mut() {
+            here = here.wrapping_add(*begin);
+            // Where the row before this one ends, if nothing is in it yet.
+            (*begin, sum) = (sum, sum + here);
+        }
+        all.clear();
+        all.resize(sum as usize, 0);
+        let most = (self.width * COLUMNS) as f64;
+        for ((i, edge), joined) in (0u64..).zip(&self.edges).zip(&self.joined) {
+            if *joined {
+                continue;
+            }
+            let [begin, end] = edge.rows;
+            let own = i << FACES_BITS | (edge.faces + NO_FACES) as u64;
+            for (row, next) in (begin..end).zip(&mut begins[begin as usize + 1..]) {
+                let column = u64::from(first(edge.at(row), most));
+                all[*next as usize] = column << (EDGE_BITS + FACES_BITS) | own;
+                *next += 1;
+            }
+        }
+        for row in begins.windows(2) {
+            all[row[0] as usize..row[1] as usize].sort_unstable();
+        }
+    }
+
+    /// The fraction of each pixel, and where covered samples begin and end.
+    fn count(&self, lists: &mut RowLists) -> (Arc<[f32]>, Vec<Crossing>) {
+        let mut counts = vec![0u16; self.width * self.rows / ROWS];
+        let mut crossings = Vec::with_capacity(4 * self.rows);
+        vectorised(
+            #[inline(always)]
+            || {
+                self.sort(lists);
+                for row in 0..self.rows {
+                    let [begin, end] = [row, row + 1].map(|row| lists.begins[row] as usize);
+                    let pixels = row / ROWS * self.width..(row / ROWS + 1) * self.width;
+                    let list = &lists.all[begin..end];
+                    row_of(list, row as u32, &mut counts[pixels], &mut crossings);
+                }
+            },
+        );
+        let fraction = |count: u16| f32::from(count) / (COLUMNS * ROWS) as f32;
+        (counts.into_iter().map(fraction).collect(), crossings)
+    }
+}
+
+/// Counts the covered samples of a row by pixel, from what is crossed in it, in order.
+#[inline(always)]
+fn row_of(list: &[u64], row: u32, counts: &mut [u16], crossings: &mut Vec<Crossing>) {
+    let (mut faces, mut begin, mut rest) = (0, 0, list);
+    while let Some(next) = rest.first() {
+        let column = next >> (FACES_BITS + EDGE_BITS);
+        let before = faces;
+        let change = |key: &u64| (key & ((1 << FACES_BITS) - 1)) as i32 - NO_FACES;
+        let here = rest.iter().take_while(|key| *key >> (FACES_BITS + EDGE_BITS) == column);
+        faces += here.clone().map(change).sum::<i32>();
+        let enters = faces > 0;
+        if enters != (before > 0) {
+            // Of those in one place, the first that goes the way of all.
+            let edge = here.clone().find(|key| (change(key) > 0) == enters).unwrap_or(next);
+            let edge = (edge >> FACES_BITS) as u32;
+            crossings.push(Crossing { row, column: column as u32, edge, enters });
+            match enters {
+                true => begin = column as usize,
+                false => add_between(counts, begin, column as usize),
+            }
+        }
+        rest = &rest[here.count()..];
+    }
+}
+
+/// Adds the samples between two columns to those of their pixels.
+#[inline(always)]
+fn add_between(counts: &mut [u16], begin: usize, end: usize) {
+    if begin >= end {
+        return;
+    }
+    let (from, to) = (begin / COLUMNS, (end - 1) / COLUMNS);
+    if let Some(counts) = counts.get_mut(from..=to) {
+        counts.iter_mut().for_each(|count| *count += COLUMNS as u16);
+        let within = [begin % COLUMNS, (to + 1) * COLUMNS - end];
+        for (at, less) in [0, to - from].into_iter().zip(within) {
+            counts[at] -= less as u16;
+        }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geom::Affine;
-    use crate::render::testing::{cuboid, sphere};
-    use crate::render::{Channels, View};
-    use glam::{DVec3, Vec3};
-    use proptest::prelude::*;
-
-    /// Fractions from a picture with `by` times as many pixels in both directions.
-    fn by_pixels(solid: &Solid, camera: &Camera, by: u32) -> Vec<f64> {
-        let finer = camera.finer(by);
-        let frame = Frame::render(solid, &finer, Channels::Depth);
-        let mask: Vec<bool> = frame.mask().collect();
-        let (width, by) = (camera.width as usize, by as usize);
-        let count = |p: usize| {
-            let (i, j) = (p % width * by, p / width * by);
-            let row = |j: usize| (i..i + by).filter(|i| mask[j * width * by + i]).count();
-            (j..j + by).map(row).sum::<usize>() as f64 / (by * by) as f64
-        };
-        (0..camera.pixels()).map(count).collect()
-    }
-
-    #[test]
-    fn triangles_that_share_edges_lose_no_sample_between_them() {
-        let mut samples = Samples::none(7, 5);
-        let point = |x: f64, y: f64| Point { x, y, nearness: 1.0 };
-        let middle = point(3.137, 2.211);
-        let around = [(-1.0, -2.0), (3.3, -2.5), (9.0, -1.0), (8.0, 6.5), (2.1, 7.0), (-3.0, 5.5)];
-        let around = around.map(|(x, y)| point(x, y));
-        for i in 0..6 {
-            samples.add(&[around[i], middle, around[(i + 1) % 6]]);
-        }
-        assert!(samples.fractions().iter().all(|f| *f == 1.0));
-        let mut nothing = Samples::none(7, 5);
-        nothing.add(&[point(f64::NAN, 1.0), point(2.0, 2.0), point(1.0, 4.0)]);
-        nothing.add(&[point(1.0, 1.0), point(2.0, 1.0), point(5.0, 1.0)]);
-        nothing.add(&[point(1e300, 1.0), point(1e300, 3.0), point(2e300, 2.0)]);
-        assert!(nothing.fractions().iter().all(|f| *f == 0.0));
-    }
-
-    #[test]
-    fn large_pictures_take_bounded_memory() {
-        let camera = Camera::default_for(1200, 1200);
-        assert!(Fractions::of(&sphere(24, 12), &camera).is_none());
-        let view = View::new(sphere(24, 12), camera);
-        let mask: Vec<f32> = view.depth(1200).mask().map(|m| f32::from(u8::from(m))).collect();
-        assert_eq!(view.fractions(1200)[..], mask[..]);
-        assert!(view.vjp_fractions(1200, &vec![1.0; 1200 * 1200]).iter().any(|g| g.x != 0.0));
-    }
-
-    proptest! {
-        #[test]
-        fn fractions_are_those_of_a_finer_picture(
-            place in prop::array::uniform3(-1.2f64..1.2),
-            turn in prop::array::uniform3(-3.0f64..3.0),
-            distance in prop_oneof![Just(0.0), Just(6.9), Just(7.6)],
-        ) {
-            let camera = Camera::default_for(20, 15);
-            let by = Affine::new(
-                DVec3::from(place) + distance * DVec3::Z, DVec3::from(turn), DVec3::ONE);
-            for solid in [sphere(24, 12), cuboid(Vec3::new(1.4, 1.0, 0.8))] {
-                let solid = solid.placed(by);
-                let own = View::new(solid.clone(), camera).fractions(20);
-                let finer = by_pixels(&solid, &camera, 32);
-                let far = own.iter().zip(&finer).map(|(a, b)| (f64::from(*a) - b).abs());
-                let worst = far.fold(0.0, f64::max);
-                // Rows of samples are a quarter of a pixel high. Along a straight edge all differences
-                // may have one sign, so those of whole pictures have no lower bound.
-                prop_assert!(worst <= 0.13, "{worst}");
-            }
-        }
-    }
-}
+#[path = "fractions_tests.rs"]
+mod tests;
