@@ -190,8 +190,8 @@ pub(in crate::render) struct Edge {
 }
 
 impl Edge {
-    /// From a side that enters so many faces, from left to right, if it leads downwards, in a
-    /// picture with so many rows.
+    /// From a side that enters this number of faces, from left to right, if it leads downwards, in a
+    /// picture with this number of rows.
     #[inline(always)]
     fn new(ends: [[f64; 2]; 2], [v, w]: [u32; 2], faces: i32, rows: usize) -> Edge {
         let ([from, to], vertices, faces) = match ends[0][1] > ends[1][1] {
