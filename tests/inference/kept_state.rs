@@ -59,7 +59,7 @@ fn the_observation_is_evaluated_for_what_the_surrogate_accepts() {
     let surrogate = "observe normal(far, 0.3) = 2 with coarse = normal(x, 0.6) as y;";
     let waiting =
         "observe normal(x, 0.6) = 2; observe normal(far, 0.3) = 2 with coarse = flat() as y;";
-    [surrogate, waiting].map(evaluated_for_what_passes);
+    [surrogate, waiting].into_iter().for_each(evaluated_for_what_passes);
 }
 
 fn evaluated_for_what_passes(observed: &str) {

@@ -272,7 +272,7 @@ impl Value {
     }
 
     /// True if it refers to no frame or node of a trace.
-    pub fn is_portable(&self) -> bool {
+    pub(crate) fn is_portable(&self) -> bool {
         match self {
             Value::Closure(_) | Value::Memo(_) | Value::Container(_) => false,
             Value::List(items) => items.iter().all(Value::is_portable),
