@@ -5,7 +5,7 @@
 //! everything else. Which ones wait depends on the program and on which observations both states
 //! have, so it is the same for a move and its reverse.
 
-use super::propose::Weight;
+use super::journal::Entry;
 use super::select::Selector;
 use super::{Trace, TraceResult};
 use crate::lang::code::{Code, Op, Operand};
@@ -28,8 +28,8 @@ impl Trace {
     }
 
     /// Evaluates the observations that wait in the pending proposal. Returns the change of the
-    /// log likelihood by them; -∞ if that changes which choices there are, as the way back would
-    /// have another first stage. `None` if nothing waits.
+    /// log likelihood by them; -∞ if the proposal changes which choices or branches there are, as
+    /// the way back could have another first stage. `None` if nothing waits.
     ///
     /// # Errors
     /// If the program fails there; the trace is then as before the proposal.
@@ -43,13 +43,12 @@ impl Trace {
         self.graph.update.resume();
         let propagated = self.graph.propagate(&self.code);
         self.graph.update.late = late;
-        let same = |whole: &Weight| {
-            let counts = |w: &Weight| (w.appeared, w.vanished);
-            counts(whole) == counts(&first)
-        };
         Some(self.pend(before, propagated).map(|whole| {
+            let rebuilt = |e: &Entry| matches!(e, Entry::FrameMade(_) | Entry::FrameDetached(_));
+            let same = whole.appeared + whole.vanished == 0
+                && !self.graph.update.journal().iter().any(rebuilt);
             let change = whole.log_likelihood - first.log_likelihood;
-            if same(&whole) && !change.is_nan() { change } else { f64::NEG_INFINITY }
+            if same && !change.is_nan() { change } else { f64::NEG_INFINITY }
         }))
     }
 }

@@ -28,7 +28,8 @@ pub(crate) const ROW: KernelRow = KernelRow::new(
     "Delayed acceptance: proposals are screened by the surrogate of `observe … with coarse = \
      …`; only those that pass are evaluated under the observation itself (Christen and Fox \
      2005). Exact for any surrogate that is positive wherever the likelihood is. Under `flat()` the \
-     observation waits until everything else has been tested.",
+     observation waits until everything else has been tested, and moves that change which choices \
+     there are are rejected: give such choices another kernel too.",
     "\
 assume x ~ normal(0, 1);
 observe normal(x, 1) = 2 with coarse = normal(x, 1.5) as y;

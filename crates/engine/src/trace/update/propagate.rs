@@ -37,8 +37,10 @@ impl Graph {
         loop {
             self.run_effects(code)?;
             // A stale choice may acquire what another node released, so stale choices run
-            // before the sweep, except those that are to be swept themselves.
-            if self.update.unheld.is_empty() && self.update.idle.is_empty() {
+            // before the sweep, except those that are to be swept themselves. So may an
+            // observation that waits: nothing is swept before the second stage.
+            let waits = !self.update.waiting.is_empty();
+            if waits || self.update.unheld.is_empty() && self.update.idle.is_empty() {
                 let Some(n) = self.update.stale_choices.pop() else { break };
                 if self.store[n].state == State::Stale {
                     self.run_in_place(code, n)?;
@@ -65,7 +67,9 @@ impl Graph {
                 None => self.sweep(),
             }
         }
-        self.sweep();
+        if self.update.waiting.is_empty() {
+            self.sweep();
+        }
         self.choices.update_selections(&self.store, &mut self.update)
     }
 
