@@ -237,6 +237,12 @@ pub mod balance {
         with_mh!("delayed(gibbs(one($finite)), @y)"),
         with_mh!("delayed(knn($continuous, bank = \"b\"), @y)"),
     ];
+    /// With an observation that waits for a second test, which moves between branches do not pass.
+    pub const WAITING: &[&str] = &[
+        with_mh!("delayed(mh(one(@**)), @y)"),
+        with_mh!("delayed(block(@**), @y)"),
+        with_mh!("delayed(drift(one(@**), 0.7), @y)"),
+    ];
     /// Proposals from a few neighbours that are unrelated to the data.
     pub const NEIGHBOURS: &[&str] = &[
         "knn(@**, bank = \"b\")",

@@ -395,7 +395,7 @@ fn choices_that_appear_and_vanish() {
 #[test]
 fn surrogates_that_decide_first() {
     all_balanced(&SURROGATE, 20_000, kernels::balance::SURROGATE);
-    all_balanced(&WAITING, 20_000, kernels::balance::SURROGATE);
+    all_balanced(&WAITING, 20_000, kernels::balance::WAITING);
 }
 
 #[test]
