@@ -123,12 +123,6 @@ pub trait Kernel: Send {
         self.scope()?.sweep(trace, after)
     }
 
-    /// True if a step makes one proposal, which may be decided in two stages.
-    #[doc(hidden)]
-    fn decides_in_stages(&self) -> bool {
-        false
-    }
-
     /// The number of steps of the sweep that remain in the present state.
     #[doc(hidden)]
     fn remaining(&mut self, trace: &mut Trace) -> usize {
@@ -360,29 +354,13 @@ pub fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
     end(trace, log_ratio, accepted)
 }
 
-/// Accepts or rejects the pending proposal; where observations wait, one that passes is tested
-/// once more by their ratio, which is tempered. The product of the two probabilities is balanced
-/// as the one test of the whole ratio is (Banterle, Grazian, Lee and Robert 2019, "Accelerating
-/// Metropolis-Hastings algorithms by delayed acceptance", Foundations of Data Science 1).
-///
-/// # Errors
-/// If the program fails as the observations are evaluated, other than where it is undefined.
+/// As [`decide`], for kernels whose ratio is never NaN.
 pub(crate) fn accept_or_reject(
     trace: &mut Trace,
-    at: &StepContext,
     log_ratio: f64,
     rng: &mut Stream,
 ) -> TraceResult<Outcome> {
-    if !accepts(log_ratio, rng) {
-        return Ok(end(trace, log_ratio, false));
-    }
-    let accepted = match trace.finish_waiting().map(recoverable) {
-        None => true,
-        Some(change) => change?.is_some_and(|c| {
-            let ratio = if c.is_finite() { at.power * c } else { c };
-            accepts(ratio, rng)
-        }),
-    };
+    let accepted = accepts(log_ratio, rng);
     Ok(end(trace, log_ratio, accepted))
 }
 

@@ -25,7 +25,6 @@ mod save;
 mod score;
 mod select;
 mod shortcuts;
-mod stages;
 mod store;
 mod surrogate;
 mod terms;

@@ -37,10 +37,8 @@ impl Graph {
         loop {
             self.run_effects(code)?;
             // A stale choice may acquire what another node released, so stale choices run
-            // before the sweep, except those that are to be swept themselves. So may an
-            // observation that waits: nothing is swept before the second stage.
-            let waits = !self.update.waiting.is_empty();
-            if waits || self.update.unheld.is_empty() && self.update.idle.is_empty() {
+            // before the sweep, except those that are to be swept themselves.
+            if self.update.unheld.is_empty() && self.update.idle.is_empty() {
                 let Some(n) = self.update.stale_choices.pop() else { break };
                 if self.store[n].state == State::Stale {
                     self.run_in_place(code, n)?;
@@ -67,9 +65,7 @@ impl Graph {
                 None => self.sweep(),
             }
         }
-        if self.update.waiting.is_empty() {
-            self.sweep();
-        }
+        self.sweep();
         self.choices.update_selections(&self.store, &mut self.update)
     }
 
@@ -109,9 +105,7 @@ impl Graph {
         let mut result = Ok(());
         for n in stale.drain(..) {
             if self.store[n].state == State::Stale {
-                let late = self.update.late.as_ref();
-                let waits = late.is_some_and(|late| late.contains(&self.store[n].op));
-                result = if waits { self.wait(code, n) } else { self.run_in_place(code, n) };
+                result = self.run_in_place(code, n);
                 if result.is_err() {
                     break;
                 }
@@ -135,14 +129,6 @@ impl Graph {
     /// frame.
     fn run_in_place(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
         if self.stays(code, n)? { self.evaluate(code, n) } else { Ok(()) }
-    }
-
-    /// Leaves an observation to the second stage, unless its frame is detached.
-    fn wait(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
-        if self.stays(code, n)? {
-            self.update.waiting.push(n);
-        }
-        Ok(())
     }
 
     /// True if no owner of an enclosing frame detaches the frame of a node: outer owners decide
