@@ -237,7 +237,7 @@ pub mod balance {
         with_mh!("delayed(gibbs(one($finite)), @y)"),
         with_mh!("delayed(knn($continuous, bank = \"b\"), @y)"),
     ];
-    /// With an observation that waits for a second test, which moves between branches do not pass.
+    /// With an observation that the first stage leaves out; no move between branches is accepted.
     pub const WAITING: &[&str] = &[
         with_mh!("delayed(mh(one(@**)), @y)"),
         with_mh!("delayed(block(@**), @y)"),

@@ -86,7 +86,7 @@ const SURROGATE: Case = Case {
     ..STRUCTURE
 };
 
-/// The same in two parts, of which one waits until the other has been tested.
+/// The same in two parts, of which the first stage leaves one out.
 const WAITING: Case = Case {
     name: "waiting",
     text: "assume c ~ flip(0.4);

@@ -74,7 +74,7 @@ fn labels_are_summed_out() {
 #[test]
 fn surrogates_leave_the_posterior_as_it_is() {
     let surrogate = "observe normal(x, 0.5) = 2 with coarse = normal(x + 0.4, 0.8) as y;";
-    // The same likelihood in two parts, of which one waits for the second stage.
+    // The same likelihood in two parts, of which the first stage leaves one out.
     let waiting = "observe normal(x, sqrt(0.5)) = 2;
                    observe normal(x, sqrt(0.5)) = 2 with coarse = flat() as y;";
     let each = |observed| kernels::exact::DELAYED.iter().map(move |kernel| (observed, kernel));

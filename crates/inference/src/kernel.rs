@@ -349,23 +349,12 @@ pub fn accepts(log_ratio: f64, rng: &mut Stream) -> bool {
 
 /// Accepts or rejects the pending proposal. NaN counts as a rejection.
 pub fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
-    let log_ratio = if log_ratio.is_nan() { f64::NEG_INFINITY } else { log_ratio };
-    let accepted = accepts(log_ratio, rng);
-    end(trace, log_ratio, accepted)
+    accept_or_reject(trace, if log_ratio.is_nan() { f64::NEG_INFINITY } else { log_ratio }, rng)
 }
 
 /// As [`decide`], for kernels whose ratio is never NaN.
-pub(crate) fn accept_or_reject(
-    trace: &mut Trace,
-    log_ratio: f64,
-    rng: &mut Stream,
-) -> TraceResult<Outcome> {
+pub(crate) fn accept_or_reject(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
     let accepted = accepts(log_ratio, rng);
-    Ok(end(trace, log_ratio, accepted))
-}
-
-/// Ends the pending proposal.
-fn end(trace: &mut Trace, log_ratio: f64, accepted: bool) -> Outcome {
     if accepted {
         trace.commit()
     } else {

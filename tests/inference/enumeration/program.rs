@@ -37,7 +37,7 @@ pub enum Dist {
     Normal(Expr, Expr),
     Beta(f64, f64),
     Poisson(Expr),
-    /// Only as a surrogate: the observation waits for the second stage.
+    /// Only as a surrogate: the first stage leaves the observation out.
     Flat,
 }
 

@@ -51,6 +51,6 @@ impl Kernel for Block {
         let proposed = trace.regenerate(&targets, at.draws(0));
         let Some(weight) = recoverable(proposed)? else { return Ok(Outcome::failed()) };
         let ratio = at.tempered(&weight) + ways - self.scope.reverse_selection(trace);
-        accept_or_reject(trace, ratio, &mut rng)
+        Ok(accept_or_reject(trace, ratio, &mut rng))
     }
 }

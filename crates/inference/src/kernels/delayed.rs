@@ -146,7 +146,7 @@ impl Kernel for Delayed {
                     trace,
                     if same { fine - coarse } else { f64::NEG_INFINITY },
                     &mut at.stream(),
-                )?;
+                );
                 Outcome { accepted: decided.accepted.min(inner.accepted), ..inner }
             }
         };

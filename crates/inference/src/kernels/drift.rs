@@ -303,7 +303,7 @@ impl Kernel for Drift {
                     ratio = f64::NEG_INFINITY;
                 }
                 self.structural |= structural && joint && at.adapting && self.adaptive;
-                accept_or_reject(trace, ratio, &mut rng)?
+                accept_or_reject(trace, ratio, &mut rng)
             }
         };
         outcome.site = (!joint).then_some(targets[0]);

@@ -156,7 +156,7 @@ impl ProgramKernel {
                 trace.rollback();
                 Err(e)
             }
-            _ => accept_or_reject(trace, ratio, &mut rng),
+            _ => Ok(accept_or_reject(trace, ratio, &mut rng)),
         }
     }
 

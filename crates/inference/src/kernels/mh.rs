@@ -46,6 +46,6 @@ impl Kernel for Mh {
         let Some(weight) = recoverable(proposed)? else { return Ok(Outcome::failed().at(target)) };
         let ratio =
             at.tempered(&weight) + libm::log(n as f64) - self.scope.reverse_selection(trace);
-        Ok(accept_or_reject(trace, ratio, &mut rng)?.at(target))
+        Ok(accept_or_reject(trace, ratio, &mut rng).at(target))
     }
 }

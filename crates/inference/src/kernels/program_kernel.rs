@@ -471,7 +471,7 @@ impl ProgramKernel {
         if w.appeared + w.vanished == 0
             && let Some(back) = self.reverse((trace, aside), at, &forth.all, &new, &auxiliaries)
         {
-            return accept_or_reject(trace, ratio(trace, Some(back)), &mut rng);
+            return Ok(accept_or_reject(trace, ratio(trace, Some(back)), &mut rng));
         }
         // The replay reads the new state, which must be committed for that.
         let removed = trace.removed();

@@ -126,14 +126,8 @@ impl Graph {
     }
 
     /// Runs an effect or choice, unless an owner of an enclosing frame detaches that
-    /// frame.
+    /// frame: outer owners decide whether inner ones still exist.
     fn run_in_place(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
-        if self.stays(code, n)? { self.evaluate(code, n) } else { Ok(()) }
-    }
-
-    /// True if no owner of an enclosing frame detaches the frame of a node: outer owners decide
-    /// whether inner ones still exist.
-    fn stays(&mut self, code: &Code, n: NodeId) -> Result<bool, Failure> {
         let mut owners: SmallVec<[NodeId; 8]> = self.owners(n).collect();
         while let Some(owner) = owners.pop() {
             if self.store[owner].state == State::Stale {
@@ -141,10 +135,10 @@ impl Graph {
             }
             let below = owners.last().copied().unwrap_or(n);
             if !self.store[self.store[below].frame].attached {
-                return Ok(false);
+                return Ok(());
             }
         }
-        Ok(true)
+        self.evaluate(code, n)
     }
 
     /// Brings a node up to date.
