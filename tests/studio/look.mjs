@@ -55,10 +55,10 @@ export function checkChanged(before, after, what, fraction = 0.002) {
   return `${(100 * changed).toFixed(1)}% of the pixels changed`;
 }
 
-/** The best log joint that the top bar tells, or null. */
-export async function bestJoint(page) {
-  const text = await page.locator(".status").innerText();
-  const match = text.replaceAll("\u2212", "-").match(/best log joint (-?[\d.]+)/);
+/** The log joint that a part of the page tells (the status: that of the best state), or null. */
+export async function logJoint(page, selector) {
+  const text = await page.locator(selector).innerText();
+  const match = text.replaceAll("\u2212", "-").match(/log joint (-?[\d.]+)/);
   return match ? Number(match[1]) : null;
 }
 
