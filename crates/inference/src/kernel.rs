@@ -123,6 +123,12 @@ pub trait Kernel: Send {
         self.scope()?.sweep(trace, after)
     }
 
+    /// True if a step makes one proposal, which may be decided in two stages.
+    #[doc(hidden)]
+    fn decides_in_stages(&self) -> bool {
+        false
+    }
+
     /// The number of steps of the sweep that remain in the present state.
     #[doc(hidden)]
     fn remaining(&mut self, trace: &mut Trace) -> usize {
@@ -349,12 +355,39 @@ pub fn accepts(log_ratio: f64, rng: &mut Stream) -> bool {
 
 /// Accepts or rejects the pending proposal. NaN counts as a rejection.
 pub fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
-    accept_or_reject(trace, if log_ratio.is_nan() { f64::NEG_INFINITY } else { log_ratio }, rng)
+    let log_ratio = if log_ratio.is_nan() { f64::NEG_INFINITY } else { log_ratio };
+    let accepted = accepts(log_ratio, rng);
+    end(trace, log_ratio, accepted)
 }
 
-/// As [`decide`], for kernels whose ratio is never NaN.
-pub(crate) fn accept_or_reject(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
-    let accepted = accepts(log_ratio, rng);
+/// Accepts or rejects the pending proposal; where observations wait, one that passes is tested
+/// once more by their ratio, which is tempered. The product of the two probabilities is balanced
+/// as the one test of the whole ratio is (Banterle, Grazian, Lee and Robert 2019, "Accelerating
+/// Metropolis-Hastings algorithms by delayed acceptance", Foundations of Data Science 1).
+///
+/// # Errors
+/// If the program fails as the observations are evaluated, other than where it is undefined.
+pub(crate) fn accept_or_reject(
+    trace: &mut Trace,
+    at: &StepContext,
+    log_ratio: f64,
+    rng: &mut Stream,
+) -> TraceResult<Outcome> {
+    if !accepts(log_ratio, rng) {
+        return Ok(end(trace, log_ratio, false));
+    }
+    let accepted = match trace.finish_waiting().map(recoverable) {
+        None => true,
+        Some(change) => change?.is_some_and(|c| {
+            let ratio = if c.is_finite() { at.power * c } else { c };
+            accepts(ratio, rng)
+        }),
+    };
+    Ok(end(trace, log_ratio, accepted))
+}
+
+/// Ends the pending proposal.
+fn end(trace: &mut Trace, log_ratio: f64, accepted: bool) -> Outcome {
     if accepted {
         trace.commit()
     } else {

@@ -188,7 +188,10 @@ impl Graph {
         let op = self.op(n);
         match op {
             Op::Draw { .. } => self.retire_choice(n),
-            Op::Observe { .. } | Op::Factor { .. } => self.retire_score(n),
+            Op::Observe { .. } | Op::Factor { .. } => {
+                self.update.effects_changed += 1;
+                self.retire_score(n);
+            }
             _ => {}
         }
         if self.store[n].flags & HELD != 0 {

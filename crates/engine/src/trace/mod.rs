@@ -25,6 +25,7 @@ mod save;
 mod score;
 mod select;
 mod shortcuts;
+mod stages;
 mod store;
 mod surrogate;
 mod terms;

@@ -17,6 +17,25 @@ impl Trace {
     /// # Errors
     /// If the evaluation of the surrogates fails.
     pub fn under_surrogates(&self, at: &Selector) -> TraceResult<Option<Trace>> {
+        let ops = self.coarse_observations(at);
+        if ops.is_empty() {
+            return Ok(None);
+        }
+        let code = Arc::new(self.present_code().with_surrogates(&ops));
+        let (mut surrogate, _) = Trace::generate(
+            code,
+            self.constraints(),
+            Draws::default(),
+            self.graph.budget.limits.clone(),
+        )?;
+        surrogate.graph.store.observed = Arc::clone(&self.graph.store.observed);
+        surrogate.graph.store.incremental = self.graph.incremental;
+        Ok(Some(surrogate))
+    }
+
+    /// Returns the selected observations that have a coarse surrogate, also those that do not exist
+    /// in this state.
+    pub(super) fn coarse_observations(&self, at: &Selector) -> Vec<OpId> {
         let mut present: FxHashMap<OpId, bool> = FxHashMap::default();
         for n in self.scored_nodes() {
             *present.entry(self.graph.store[n].op).or_default() |= at.names(&self.graph.address(n));
@@ -31,20 +50,7 @@ impl Trace {
             }
             _ => false,
         };
-        let ops: Vec<OpId> = (0..self.code.ops.len()).map(OpId::new).filter(named).collect();
-        if ops.is_empty() {
-            return Ok(None);
-        }
-        let code = Arc::new(self.present_code().with_surrogates(&ops));
-        let (mut surrogate, _) = Trace::generate(
-            code,
-            self.constraints(),
-            Draws::default(),
-            self.graph.budget.limits.clone(),
-        )?;
-        surrogate.graph.store.observed = Arc::clone(&self.graph.store.observed);
-        surrogate.graph.store.incremental = self.graph.incremental;
-        Ok(Some(surrogate))
+        (0..self.code.ops.len()).map(OpId::new).filter(named).collect()
     }
 
     /// Proposes the values of another trace's choices. Choices that the other trace does

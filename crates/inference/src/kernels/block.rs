@@ -38,6 +38,10 @@ impl Kernel for Block {
         "block".into()
     }
 
+    fn decides_in_stages(&self) -> bool {
+        true
+    }
+
     fn scope(&mut self) -> Option<&mut Registered> {
         Some(&mut self.scope)
     }
@@ -51,6 +55,6 @@ impl Kernel for Block {
         let proposed = trace.regenerate(&targets, at.draws(0));
         let Some(weight) = recoverable(proposed)? else { return Ok(Outcome::failed()) };
         let ratio = at.tempered(&weight) + ways - self.scope.reverse_selection(trace);
-        Ok(accept_or_reject(trace, ratio, &mut rng))
+        accept_or_reject(trace, at, ratio, &mut rng)
     }
 }

@@ -8,21 +8,30 @@
 //! reversible under the surrogate this leaves the posterior invariant, however poor the
 //! surrogate is, as long as it has positive density wherever the observation has. The
 //! observation itself is evaluated only for moves that pass the first stage.
+//!
+//! Where the surrogates are `flat()` and the inner kernel makes one proposal, there is no second
+//! trace: the observations wait until everything else has been tested. A first stage cannot tell
+//! whether the structure will change, so such moves are rejected while something waits; one step
+//! of [`STRUCTURAL`], chosen at random, waits for nothing.
 
 use super::row::{Built, INNER, KernelRow, Type, arg};
 use crate::calls::error::fail;
 use crate::kernel::{Kernel, Outcome, StepContext, accept_or_reject, recoverable};
 use crate::state::StateError;
 use pcadlang_engine::lang::error::RunError;
+use pcadlang_engine::lang::ids::OpId;
 use pcadlang_engine::trace::{Selector, Trace, TraceResult};
 use pcadlang_syntax::span::Span;
+use std::sync::Arc;
 
 pub(crate) const ROW: KernelRow = KernelRow::new(
     "delayed",
     &[INNER, arg("at", Type::Selection, "The observation with a coarse surrogate.")],
     "Delayed acceptance: proposals are screened by the surrogate of `observe … with coarse = \
      …`; only those that pass are evaluated under the observation itself (Christen and Fox \
-     2005). Exact for any surrogate that is positive wherever the likelihood is.",
+     2005). Exact for any surrogate that is positive wherever the likelihood is. Under `flat()` the \
+     observation waits until everything else has been tested; moves that change which choices \
+     there are pass in one step of sixteen, in which nothing waits.",
     "\
 assume x ~ normal(0, 1);
 observe normal(x, 1) = 2 with coarse = normal(x, 1.5) as y;
@@ -36,6 +45,9 @@ infer { repeat 100 { delayed(mh(@x), at = @y); collect x; } }",
 )
 .of_reversible("delayed(drift(@x), @obs)");
 
+/// One step of so many may change which choices and observations there are.
+const STRUCTURAL: u64 = 16;
+
 /// Two-stage acceptance with a reversible inner kernel.
 pub struct Delayed {
     kernel: Box<dyn Kernel>,
@@ -44,13 +56,15 @@ pub struct Delayed {
     span: Span,
     /// The trace under the surrogates.
     surrogate: Option<Trace>,
+    /// The observations that wait, where there is no second trace; `None` if not known yet.
+    waiting: Option<Option<Arc<[OpId]>>>,
 }
 
 impl Delayed {
     /// `observations` are those that have surrogates; `span` is the position that errors
     /// refer to.
     pub fn new(kernel: Box<dyn Kernel>, observations: Selector, span: Span) -> Self {
-        Delayed { kernel, observations, span, surrogate: None }
+        Delayed { kernel, observations, span, surrogate: None, waiting: None }
     }
 
     /// Moves the surrogate trace to the present state.
@@ -73,6 +87,13 @@ impl Delayed {
             ));
         }
         Ok(self.surrogate.insert(surrogate))
+    }
+
+    /// The observations that wait, if there is no second trace.
+    fn waiting(&mut self, trace: &Trace) -> Option<Arc<[OpId]>> {
+        let (kernel, at) = (&self.kernel, &self.observations);
+        let found = || trace.flat_surrogates(at).filter(|_| kernel.decides_in_stages());
+        self.waiting.get_or_insert_with(found).clone()
     }
 
     fn nothing_coarse(&self) -> Box<RunError> {
@@ -105,20 +126,36 @@ impl Kernel for Delayed {
     }
 
     fn sweep(&mut self, trace: &mut Trace, after: Option<u64>) -> Option<usize> {
+        if self.waiting(trace).is_some() {
+            return self.kernel.sweep(trace, after);
+        }
         // Errors are reported by the step.
         self.follow(trace).ok()?;
         self.kernel.sweep(self.surrogate.as_mut()?, after)
     }
 
-    fn remaining(&mut self, _: &mut Trace) -> usize {
+    fn remaining(&mut self, trace: &mut Trace) -> usize {
+        if self.waiting(trace).is_some() {
+            return self.kernel.remaining(trace);
+        }
         self.surrogate.as_mut().map_or(0, |surrogate| self.kernel.remaining(surrogate))
     }
 
-    fn visited(&mut self, _: &Trace) -> Option<u64> {
+    fn visited(&mut self, trace: &Trace) -> Option<u64> {
+        if self.waiting(trace).is_some() {
+            return self.kernel.visited(trace);
+        }
         self.kernel.visited(self.surrogate.as_ref()?)
     }
 
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
+        if let waiting @ Some(_) = self.waiting(trace) {
+            let waits = at.within(STRUCTURAL).stream().open_uniform() > 1.0 / STRUCTURAL as f64;
+            trace.set_waiting(waiting.filter(|_| waits));
+            let done = self.kernel.step(trace, at);
+            trace.set_waiting(None);
+            return done;
+        }
         self.follow(trace)?;
         let Some(surrogate) = &mut self.surrogate else { return Ok(Outcome::default()) };
         let before = tempered(surrogate, at.power);
@@ -142,11 +179,8 @@ impl Kernel for Delayed {
                 let same = trace.lacks(surrogate).is_none()
                     && trace.beyond(surrogate) == beyond
                     && !trace.takes_away(&beyond);
-                let decided = accept_or_reject(
-                    trace,
-                    if same { fine - coarse } else { f64::NEG_INFINITY },
-                    &mut at.stream(),
-                );
+                let ratio = if same { fine - coarse } else { f64::NEG_INFINITY };
+                let decided = accept_or_reject(trace, at, ratio, &mut at.stream())?;
                 Outcome { accepted: decided.accepted.min(inner.accepted), ..inner }
             }
         };

@@ -229,6 +229,10 @@ impl Kernel for Drift {
         "drift".into()
     }
 
+    fn decides_in_stages(&self) -> bool {
+        true
+    }
+
     fn scope(&mut self) -> Option<&mut Registered> {
         Some(&mut self.scope)
     }
@@ -303,7 +307,7 @@ impl Kernel for Drift {
                     ratio = f64::NEG_INFINITY;
                 }
                 self.structural |= structural && joint && at.adapting && self.adaptive;
-                accept_or_reject(trace, ratio, &mut rng)
+                accept_or_reject(trace, at, ratio, &mut rng)?
             }
         };
         outcome.site = (!joint).then_some(targets[0]);

@@ -156,7 +156,7 @@ impl ProgramKernel {
                 trace.rollback();
                 Err(e)
             }
-            _ => Ok(accept_or_reject(trace, ratio, &mut rng)),
+            _ => accept_or_reject(trace, at, ratio, &mut rng),
         }
     }
 

@@ -391,7 +391,7 @@ impl Kernel for Knn {
         if w.log_joint == f64::NEG_INFINITY {
             ratio = f64::NEG_INFINITY;
         }
-        Ok(accept_or_reject(trace, ratio, &mut rng))
+        accept_or_reject(trace, at, ratio, &mut rng)
     }
 }
 

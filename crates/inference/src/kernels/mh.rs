@@ -33,6 +33,10 @@ impl Kernel for Mh {
         "mh".into()
     }
 
+    fn decides_in_stages(&self) -> bool {
+        true
+    }
+
     fn scope(&mut self) -> Option<&mut Registered> {
         Some(&mut self.scope)
     }
@@ -46,6 +50,6 @@ impl Kernel for Mh {
         let Some(weight) = recoverable(proposed)? else { return Ok(Outcome::failed().at(target)) };
         let ratio =
             at.tempered(&weight) + libm::log(n as f64) - self.scope.reverse_selection(trace);
-        Ok(accept_or_reject(trace, ratio, &mut rng).at(target))
+        Ok(accept_or_reject(trace, at, ratio, &mut rng)?.at(target))
     }
 }

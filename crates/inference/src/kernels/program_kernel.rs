@@ -415,6 +415,10 @@ impl Kernel for ProgramKernel {
         self.declared().name.node.to_string()
     }
 
+    fn decides_in_stages(&self) -> bool {
+        true
+    }
+
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
         let new = || Trace::prior(Arc::clone(trace.code()), Limits::default());
         let mut aside = self.aside.take().unwrap_or_else(new);
@@ -471,13 +475,17 @@ impl ProgramKernel {
         if w.appeared + w.vanished == 0
             && let Some(back) = self.reverse((trace, aside), at, &forth.all, &new, &auxiliaries)
         {
-            return Ok(accept_or_reject(trace, ratio(trace, Some(back)), &mut rng));
+            return accept_or_reject(trace, at, ratio(trace, Some(back)), &mut rng);
         }
         // The replay reads the new state, which must be committed for that.
+        let rest = match trace.finish_waiting().map(recoverable).transpose()? {
+            Some(None) => return Ok(Outcome::failed()),
+            rest => rest.flatten().unwrap_or(0.0),
+        };
         let removed = trace.removed();
         trace.commit();
         let back = recoverable(self.play(trace, at, AuxiliaryValues::Given(&auxiliaries), None))?;
-        if accepts(ratio(trace, back), &mut rng) {
+        if accepts(ratio(trace, back) + at.power * rest, &mut rng) {
             return Ok(Outcome::one(true));
         }
         trace.propose_constrained(&undo, &removed, at.draws(1))?;

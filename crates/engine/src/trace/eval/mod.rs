@@ -159,10 +159,7 @@ impl Graph {
             Ok(score) => score?,
             Err(m) => return self.need(m),
         };
-        let stale = self.store[n].flags & WAS_STALE != 0;
-        if stale {
-            self.retire_score(n);
-        }
+        self.retire_previous(n);
         match score {
             Score::One(score) => {
                 self.score.likelihood.add(score);
@@ -252,12 +249,19 @@ impl Graph {
                 return Err(self.type_error(n, message));
             }
         };
-        if self.store[n].flags & WAS_STALE != 0 {
-            self.retire_score(n);
-        }
+        self.retire_previous(n);
         self.score.likelihood.add(score);
         self.store[n].score = score;
         Ok(self.finish(n, Value::Unit))
+    }
+
+    /// Removes the score that an observation or factor had, if it existed before.
+    fn retire_previous(&mut self, n: NodeId) {
+        if self.store[n].flags & WAS_STALE != 0 {
+            self.retire_score(n);
+        } else {
+            self.update.effects_changed += 1;
+        }
     }
 
     /// Removes an observation's or factor's score from the likelihood.

@@ -11,9 +11,11 @@ use super::journal::Entry;
 use super::node::*;
 use super::propose::{Constraint, Draws, Pending};
 use super::store::Store;
+use crate::lang::ids::OpId;
 use crate::lang::key::Key;
 use pcadlang_numerics::dist::Datum;
 use rustc_hash::FxHashMap;
+use std::sync::Arc;
 
 /// The state of one update.
 #[derive(Clone, Debug, Default)]
@@ -30,6 +32,10 @@ pub(crate) struct Update {
     /// Effects and choices that became stale.
     stale_effects: Vec<NodeId>,
     stale_choices: Vec<NodeId>,
+    /// Observations that wait for a second stage ([`Trace::set_waiting`](super::Trace)), and the
+    /// nodes of this update that do.
+    pub late: Option<Arc<[OpId]>>,
+    pub waiting: Vec<NodeId>,
     /// Nodes whose last reference was released.
     pub unheld: Vec<NodeId>,
     /// Entries of `mem` functions whose last call was released.
@@ -51,6 +57,8 @@ pub(crate) struct Update {
     /// How many choices appeared and vanished.
     pub appeared: u32,
     pub vanished: u32,
+    /// How many observations and factors did.
+    pub effects_changed: u32,
     pub draws: Draws,
     /// Set while a program runs for the first time: improper choices may then take a
     /// value to start from.
@@ -69,8 +77,13 @@ impl Update {
         self.redrawn.clear();
         self.retired.clear();
         self.removed.clear();
-        (self.appeared, self.vanished) = (0, 0);
+        (self.appeared, self.vanished, self.effects_changed) = (0, 0, 0);
         self.next_epoch()
+    }
+
+    /// Lets the observations that wait run.
+    pub fn resume(&mut self) {
+        self.stale_effects.append(&mut self.waiting);
     }
 
     /// True if it has neither changed which choices there are nor drawn any.
@@ -172,6 +185,7 @@ impl Update {
         self.effects.clear();
         self.stale_effects.clear();
         self.stale_choices.clear();
+        self.waiting.clear();
         self.unheld.clear();
         self.idle.clear();
         self.detached.clear();

@@ -37,8 +37,10 @@ impl Graph {
         loop {
             self.run_effects(code)?;
             // A stale choice may acquire what another node released, so stale choices run
-            // before the sweep, except those that are to be swept themselves.
-            if self.update.unheld.is_empty() && self.update.idle.is_empty() {
+            // before the sweep, except those that are to be swept themselves. So may an
+            // observation that waits: nothing is swept before the second stage.
+            let waits = !self.update.waiting.is_empty();
+            if waits || self.update.unheld.is_empty() && self.update.idle.is_empty() {
                 let Some(n) = self.update.stale_choices.pop() else { break };
                 if self.store[n].state == State::Stale {
                     self.run_in_place(code, n)?;
@@ -65,7 +67,9 @@ impl Graph {
                 None => self.sweep(),
             }
         }
-        self.sweep();
+        if self.update.waiting.is_empty() {
+            self.sweep();
+        }
         self.choices.update_selections(&self.store, &mut self.update)
     }
 
@@ -105,7 +109,9 @@ impl Graph {
         let mut result = Ok(());
         for n in stale.drain(..) {
             if self.store[n].state == State::Stale {
-                result = self.run_in_place(code, n);
+                let late = self.update.late.as_ref();
+                let waits = late.is_some_and(|late| late.contains(&self.store[n].op));
+                result = if waits { self.wait(code, n) } else { self.run_in_place(code, n) };
                 if result.is_err() {
                     break;
                 }
@@ -126,8 +132,22 @@ impl Graph {
     }
 
     /// Runs an effect or choice, unless an owner of an enclosing frame detaches that
-    /// frame: outer owners decide whether inner ones still exist.
+    /// frame.
     fn run_in_place(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
+        if self.stays(code, n)? { self.evaluate(code, n) } else { Ok(()) }
+    }
+
+    /// Leaves an observation to the second stage, unless its frame is detached.
+    fn wait(&mut self, code: &Code, n: NodeId) -> Result<(), Failure> {
+        if self.stays(code, n)? {
+            self.update.waiting.push(n);
+        }
+        Ok(())
+    }
+
+    /// True if no owner of an enclosing frame detaches the frame of a node: outer owners decide
+    /// whether inner ones still exist.
+    fn stays(&mut self, code: &Code, n: NodeId) -> Result<bool, Failure> {
         let mut owners: SmallVec<[NodeId; 8]> = self.owners(n).collect();
         while let Some(owner) = owners.pop() {
             if self.store[owner].state == State::Stale {
@@ -135,10 +155,10 @@ impl Graph {
             }
             let below = owners.last().copied().unwrap_or(n);
             if !self.store[self.store[below].frame].attached {
-                return Ok(());
+                return Ok(false);
             }
         }
-        self.evaluate(code, n)
+        Ok(true)
     }
 
     /// Brings a node up to date.
