@@ -51,6 +51,11 @@ impl StepContext {
         StreamKey::new(self.seed, self.chain, Purpose::KERNEL).stream(self.step, 0, self.part)
     }
 
+    /// The change of the log likelihood in a stage, raised to the power.
+    pub(crate) fn tempered_change(&self, change: f64) -> f64 {
+        if change.is_finite() { self.power * change } else { change }
+    }
+
     /// The log weight of an update, with the likelihood raised to the power.
     pub fn tempered(&self, w: &Weight) -> f64 {
         w.tempered(self.power)
@@ -123,9 +128,9 @@ pub trait Kernel: Send {
         self.scope()?.sweep(trace, after)
     }
 
-    /// True if a step makes one proposal, which may be decided in two stages.
+    /// True if a step makes one proposal, which may be decided in stages.
     #[doc(hidden)]
-    fn decides_in_stages(&self) -> bool {
+    fn decides_in_stages(&mut self, _: &Trace) -> bool {
         false
     }
 
@@ -361,8 +366,8 @@ pub fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
 }
 
 /// Accepts or rejects the pending proposal; where observations wait, one that passes is tested
-/// once more by their ratio, which is tempered. The product of the two probabilities is balanced
-/// as the one test of the whole ratio is (Banterle, Grazian, Lee and Robert 2019, "Accelerating
+/// once more by the ratio of each stage, which is tempered. The product of the probabilities is
+/// balanced as the one test of the whole ratio is (Banterle, Grazian, Lee and Robert 2019, "Accelerating
 /// Metropolis-Hastings algorithms by delayed acceptance", Foundations of Data Science 1).
 ///
 /// # Errors
@@ -373,16 +378,10 @@ pub(crate) fn accept_or_reject(
     log_ratio: f64,
     rng: &mut Stream,
 ) -> TraceResult<Outcome> {
-    if !accepts(log_ratio, rng) {
-        return Ok(end(trace, log_ratio, false));
+    let mut accepted = accepts(log_ratio, rng);
+    while accepted && let Some(change) = trace.next_stage() {
+        accepted = recoverable(change)?.is_some_and(|c| accepts(at.tempered_change(c), rng));
     }
-    let accepted = match trace.finish_waiting().map(recoverable) {
-        None => true,
-        Some(change) => change?.is_some_and(|c| {
-            let ratio = if c.is_finite() { at.power * c } else { c };
-            accepts(ratio, rng)
-        }),
-    };
     Ok(end(trace, log_ratio, accepted))
 }
 

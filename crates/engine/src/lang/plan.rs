@@ -363,7 +363,9 @@ impl Formula {
         match &self.kind {
             FormulaKind::Const(_) => true,
             FormulaKind::Given(_) => false,
-            FormulaKind::Function { given, is_closed, .. } => given.is_empty() && *is_closed,
+            FormulaKind::Function { given, is_closed, is_settled, .. } => {
+                given.is_empty() && (*is_closed || *is_settled)
+            }
         }
     }
 }

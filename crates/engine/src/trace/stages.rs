@@ -1,10 +1,11 @@
-//! Updates in two stages: what a proposal leaves to be evaluated only once it has passed a first
-//! test.
+//! Updates in stages: what a proposal leaves to be evaluated only once it has passed a test of
+//! everything before it.
 //!
-//! Observations that wait keep their score, so that the weight of the first stage is that of
-//! everything else. Which ones wait depends on the program and on which observations both states
+//! Observations that wait keep their score, so that the weight of a stage is that of everything
+//! evaluated so far. Which ones wait depends on the program and on which observations both states
 //! have, so it is the same for a move and its reverse.
 
+use super::graph::Graph;
 use super::select::Selector;
 use super::{Trace, TraceResult};
 use crate::lang::code::{Code, Op, Operand};
@@ -21,27 +22,32 @@ impl Trace {
         flat.then(|| all.into())
     }
 
-    /// Lets these observations wait in the proposals that follow.
-    pub fn set_waiting(&mut self, observations: Option<Arc<[OpId]>>) {
-        self.graph.update.late = observations;
+    /// Lets these observations wait in the proposals that follow, until the others that are told
+    /// to wait before this ends have been tested.
+    pub fn let_wait(&mut self, observations: Arc<[OpId]>) {
+        self.graph.update.late.push(observations);
     }
 
-    /// Evaluates the observations that wait in the pending proposal. Returns the change of the
-    /// log likelihood by them; -∞ if the proposal changes which choices or observations there are,
-    /// as the way back could have another first stage. `None` if nothing waits.
+    /// Ends the last [`Trace::let_wait`].
+    pub fn end_wait(&mut self) {
+        self.graph.update.late.pop();
+    }
+
+    /// Evaluates the observations of the next stage in the pending proposal. Returns the change of
+    /// the log likelihood by them; -∞ if the proposal changes which choices or observations there
+    /// are, as the way back could have another first stage. `None` if nothing waits.
     ///
     /// # Errors
     /// If the program fails there; the trace is then as before the proposal.
-    pub fn finish_waiting(&mut self) -> Option<TraceResult<f64>> {
+    pub fn next_stage(&mut self) -> Option<TraceResult<f64>> {
         if self.graph.update.waiting.is_empty() {
             return None;
         }
         let before = self.update.take()?;
         let first = self.graph.weight(&before);
-        let late = std::mem::take(&mut self.graph.update.late);
-        self.graph.update.resume();
+        let Graph { update, store, .. } = &mut self.graph;
+        update.begin_stage(store);
         let propagated = self.graph.propagate(&self.code);
-        self.graph.update.late = late;
         Some(self.pend(before, propagated).map(|whole| {
             let changed = whole.appeared + whole.vanished + self.graph.update.effects_changed;
             let change = whole.log_likelihood - first.log_likelihood;

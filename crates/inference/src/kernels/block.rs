@@ -38,7 +38,7 @@ impl Kernel for Block {
         "block".into()
     }
 
-    fn decides_in_stages(&self) -> bool {
+    fn decides_in_stages(&mut self, _: &Trace) -> bool {
         true
     }
 

@@ -14,7 +14,7 @@
 //! whether the structure will change, so such moves are rejected while something waits; one step
 //! of [`STRUCTURAL`], chosen at random, waits for nothing.
 
-use super::row::{Built, INNER, KernelRow, Type, arg};
+use super::row::{Built, INNER, KernelRow, Type, arg, opt};
 use crate::calls::error::fail;
 use crate::kernel::{Kernel, Outcome, StepContext, accept_or_reject, recoverable};
 use crate::state::StateError;
@@ -26,7 +26,11 @@ use std::sync::Arc;
 
 pub(crate) const ROW: KernelRow = KernelRow::new(
     "delayed",
-    &[INNER, arg("at", Type::Selection, "The observation with a coarse surrogate.")],
+    &[
+        INNER,
+        arg("at", Type::Selection, "The observation with a coarse surrogate."),
+        opt("then", Type::Selection, "none", "Others, which are compared after those."),
+    ],
     "Delayed acceptance: proposals are screened by the surrogate of `observe … with coarse = \
      …`; only those that pass are evaluated under the observation itself (Christen and Fox \
      2005). Exact for any surrogate that is positive wherever the likelihood is. Under `flat()` the \
@@ -38,9 +42,13 @@ observe normal(x, 1) = 2 with coarse = normal(x, 1.5) as y;
 infer { repeat 100 { delayed(mh(@x), at = @y); collect x; } }",
     |call| {
         let inner = call.inner()?;
-        let at = call.selector("at")?;
-        let signature = format!("delayed({}, {at:?})", inner.signature);
-        Ok(Built::new(Delayed::new(inner.kernel, at, call.span()), signature))
+        let (at, then) = (call.selector("at")?, call.selector("then")?);
+        let (mut kernel, mut signature) = (inner.kernel, inner.signature);
+        for stage in [at, then].into_iter().filter(|stage| *stage != Selector::Nothing) {
+            signature = format!("delayed({signature}, {stage:?})");
+            kernel = Box::new(Delayed::new(kernel, stage, call.span()));
+        }
+        Ok(Built { kernel, signature })
     },
 )
 .of_reversible("delayed(drift(@x), @obs)");
@@ -91,9 +99,11 @@ impl Delayed {
 
     /// The observations that wait, if there is no second trace.
     fn waiting(&mut self, trace: &Trace) -> Option<Arc<[OpId]>> {
-        let (kernel, at) = (&self.kernel, &self.observations);
-        let found = || trace.flat_surrogates(at).filter(|_| kernel.decides_in_stages());
-        self.waiting.get_or_insert_with(found).clone()
+        if self.waiting.is_none() {
+            let flat = trace.flat_surrogates(&self.observations);
+            self.waiting = Some(flat.filter(|_| self.kernel.decides_in_stages(trace)));
+        }
+        self.waiting.clone().flatten()
     }
 
     fn nothing_coarse(&self) -> Box<RunError> {
@@ -125,6 +135,10 @@ impl Kernel for Delayed {
         self.kernel.load(state)
     }
 
+    fn decides_in_stages(&mut self, trace: &Trace) -> bool {
+        self.waiting(trace).is_some()
+    }
+
     fn sweep(&mut self, trace: &mut Trace, after: Option<u64>) -> Option<usize> {
         if self.waiting(trace).is_some() {
             return self.kernel.sweep(trace, after);
@@ -149,11 +163,14 @@ impl Kernel for Delayed {
     }
 
     fn step(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Outcome> {
-        if let waiting @ Some(_) = self.waiting(trace) {
+        if let Some(waiting) = self.waiting(trace) {
             let waits = at.within(STRUCTURAL).stream().open_uniform() > 1.0 / STRUCTURAL as f64;
-            trace.set_waiting(waiting.filter(|_| waits));
+            if !waits {
+                return self.kernel.step(trace, at);
+            }
+            trace.let_wait(waiting);
             let done = self.kernel.step(trace, at);
-            trace.set_waiting(None);
+            trace.end_wait();
             return done;
         }
         self.follow(trace)?;

@@ -229,7 +229,7 @@ impl Kernel for Drift {
         "drift".into()
     }
 
-    fn decides_in_stages(&self) -> bool {
+    fn decides_in_stages(&mut self, _: &Trace) -> bool {
         true
     }
 

@@ -33,7 +33,7 @@ impl Kernel for Mh {
         "mh".into()
     }
 
-    fn decides_in_stages(&self) -> bool {
+    fn decides_in_stages(&mut self, _: &Trace) -> bool {
         true
     }
 

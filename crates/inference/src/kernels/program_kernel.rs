@@ -415,7 +415,7 @@ impl Kernel for ProgramKernel {
         self.declared().name.node.to_string()
     }
 
-    fn decides_in_stages(&self) -> bool {
+    fn decides_in_stages(&mut self, _: &Trace) -> bool {
         true
     }
 
@@ -478,14 +478,22 @@ impl ProgramKernel {
             return accept_or_reject(trace, at, ratio(trace, Some(back)), &mut rng);
         }
         // The replay reads the new state, which must be committed for that.
-        let rest = match trace.finish_waiting().map(recoverable).transpose()? {
-            Some(None) => return Ok(Outcome::failed()),
-            rest => rest.flatten().unwrap_or(0.0),
-        };
+        let mut later = Vec::new();
+        while let Some(change) = trace.next_stage() {
+            match recoverable(change)? {
+                Some(c) if c > f64::NEG_INFINITY => later.push(at.tempered_change(c)),
+                Some(_) => {
+                    trace.rollback();
+                    return Ok(Outcome::one(false));
+                }
+                None => return Ok(Outcome::failed()),
+            }
+        }
         let removed = trace.removed();
         trace.commit();
         let back = recoverable(self.play(trace, at, AuxiliaryValues::Given(&auxiliaries), None))?;
-        if accepts(ratio(trace, back) + at.power * rest, &mut rng) {
+        let first = ratio(trace, back);
+        if [first].into_iter().chain(later).all(|ratio| accepts(ratio, &mut rng)) {
             return Ok(Outcome::one(true));
         }
         trace.propose_constrained(&undo, &removed, at.draws(1))?;

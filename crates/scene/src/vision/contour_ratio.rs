@@ -109,6 +109,10 @@ struct Cell {
     group: u32,
 }
 
+impl Cell {
+    const NOTHING: Cell = Cell { score: 0.0, group: NO_GROUP };
+}
+
 /// Observed contours, prepared for scoring many rendered ones.
 #[derive(Debug, Clone)]
 pub struct ContourRatio {
@@ -225,28 +229,25 @@ impl ContourRatio {
             length = length.saturating_add(sign * (weight * FIXED) as i64);
             let (low, high, f) = channels_of(e.tx, e.ty);
             let corners = self.grid.corners(e.x, e.y);
-            let shares = corners.weights();
-            // Neighbouring samples mostly belong to one group.
-            let (mut unmatched, mut group, mut given) = (0.0, NO_GROUP, [0.0; 2]);
-            for (k, part) in [(low, 1.0 - f), (high, f)] {
-                let Some(channel) = self.cells.get(k * samples..(k + 1) * samples) else {
-                    continue;
-                };
-                for (&at, share) in corners.at.iter().zip(shares) {
-                    let Some(cell) = channel.get(at) else { continue };
-                    let length = weight * f64::from(part * share);
-                    let score = length * f64::from(cell.score);
-                    if cell.group == NO_GROUP {
-                        unmatched += score;
-                    } else if cell.group == group {
-                        given = [given[0] + length, given[1] + score];
-                    } else {
-                        scratch.assign(group, given, sign);
-                        (group, given) = (cell.group, [length, score]);
-                    }
+            let cells = [low, high].map(|k| {
+                let channel = self.cells.get(k * samples..(k + 1) * samples).unwrap_or_default();
+                corners.at.map(|at| channel.get(at).copied().unwrap_or(Cell::NOTHING))
+            });
+            let group = cells[0][0].group;
+            let alike = cells.iter().flatten().fold(true, |alike, c| alike & (c.group == group));
+            // Nearly everywhere they are.
+            let unmatched = if !alike {
+                scratch.share(cells, [1.0 - f, f], corners.weights(), weight, sign)
+            } else {
+                let [a, b] = cells.map(|cells| corners.between(cells.map(|c| c.score)));
+                let score = weight * f64::from(a + f * (b - a));
+                if group == NO_GROUP {
+                    score
+                } else {
+                    scratch.assign(group, [weight, score], sign);
+                    0.0
                 }
-            }
-            scratch.assign(group, given, sign);
+            };
             total = total.saturating_add(sign * (unmatched * FIXED) as i64);
         }
         (scratch.total, scratch.length) = (total, length);
@@ -448,6 +449,36 @@ impl Scratch {
             assign.length = assign.length.saturating_add(sign * ((length * FIXED) as i64).max(1));
             assign.score = assign.score.saturating_add(sign * (score * FIXED) as i64);
         }
+    }
+
+    /// Assigns a length of contour to the groups of the cells around it, by their shares in two
+    /// channels. Returns the score of what belongs to no group.
+    fn share(
+        &mut self,
+        cells: [[Cell; 4]; 2],
+        parts: [f32; 2],
+        shares: [f32; 4],
+        whole: f64,
+        sign: i64,
+    ) -> f64 {
+        // Neighbouring samples mostly belong to one group.
+        let (mut unmatched, mut group, mut given) = (0.0, NO_GROUP, [0.0; 2]);
+        for (cells, part) in cells.iter().zip(parts) {
+            for (cell, share) in cells.iter().zip(shares) {
+                let length = whole * f64::from(part * share);
+                let score = length * f64::from(cell.score);
+                if cell.group == NO_GROUP {
+                    unmatched += score;
+                } else if cell.group == group {
+                    given = [given[0] + length, given[1] + score];
+                } else {
+                    self.assign(group, given, sign);
+                    (group, given) = (cell.group, [length, score]);
+                }
+            }
+        }
+        self.assign(group, given, sign);
+        unmatched
     }
 
     /// Records the state to return to. All matches must have been scored before.

@@ -259,6 +259,13 @@ impl Corners {
         [(1.0 - fx) * (1.0 - fy), fx * (1.0 - fy), (1.0 - fx) * fy, fx * fy]
     }
 
+    /// Interpolates between the values of the four samples.
+    #[inline(always)]
+    pub fn between(&self, [a, b, c, d]: [f32; 4]) -> f32 {
+        let (top, bottom) = (a + self.fx * (b - a), c + self.fx * (d - c));
+        top + self.fy * (bottom - top)
+    }
+
     /// Returns the interpolated value, and its derivatives per grid unit.
     #[inline(always)]
     pub fn read(&self, field: &[f32]) -> (f32, f32, f32) {

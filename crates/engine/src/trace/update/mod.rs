@@ -32,10 +32,12 @@ pub(crate) struct Update {
     /// Effects and choices that became stale.
     stale_effects: Vec<NodeId>,
     stale_choices: Vec<NodeId>,
-    /// Observations that wait for a second stage ([`Trace::set_waiting`](super::Trace)), and the
-    /// nodes of this update that do.
-    pub late: Option<Arc<[OpId]>>,
+    /// Observations that wait for a later stage ([`Trace::let_wait`](super::Trace)), those of the
+    /// last stage first, and the nodes of this update that do.
+    pub late: Vec<Arc<[OpId]>>,
     pub waiting: Vec<NodeId>,
+    /// How many stages the pending proposal has passed.
+    stage: usize,
     /// Nodes whose last reference was released.
     pub unheld: Vec<NodeId>,
     /// Entries of `mem` functions whose last call was released.
@@ -77,13 +79,25 @@ impl Update {
         self.redrawn.clear();
         self.retired.clear();
         self.removed.clear();
+        self.stage = 0;
         (self.appeared, self.vanished, self.effects_changed) = (0, 0, 0);
         self.next_epoch()
     }
 
-    /// Lets the observations that wait run.
-    pub fn resume(&mut self) {
-        self.stale_effects.append(&mut self.waiting);
+    /// True if an observation waits for a later stage.
+    pub fn is_late(&self, op: OpId) -> bool {
+        let stages = self.late.len().saturating_sub(self.stage);
+        self.late[..stages].iter().any(|stage| stage.contains(&op))
+    }
+
+    /// Begins the next stage: lets the observations run that waited for it.
+    pub fn begin_stage(&mut self, store: &Store) {
+        self.stage += 1;
+        for n in std::mem::take(&mut self.waiting) {
+            let waits = self.is_late(store[n].op);
+            let list = if waits { &mut self.waiting } else { &mut self.stale_effects };
+            list.push(n);
+        }
     }
 
     /// True if it has neither changed which choices there are nor drawn any.

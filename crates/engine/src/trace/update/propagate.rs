@@ -109,8 +109,7 @@ impl Graph {
         let mut result = Ok(());
         for n in stale.drain(..) {
             if self.store[n].state == State::Stale {
-                let late = self.update.late.as_ref();
-                let waits = late.is_some_and(|late| late.contains(&self.store[n].op));
+                let waits = self.update.is_late(self.store[n].op);
                 result = if waits { self.wait(code, n) } else { self.run_in_place(code, n) };
                 if result.is_err() {
                     break;
