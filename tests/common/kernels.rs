@@ -239,9 +239,9 @@ pub mod balance {
     ];
     /// With an observation that the first stage leaves out; no move between branches is accepted.
     pub const WAITING: &[&str] = &[
-        with_mh!("delayed(mh(one(@**)), @y)"),
-        with_mh!("delayed(block(@**), @y)"),
-        with_mh!("delayed(drift(one(@**), 0.7), @y)"),
+        "delayed(mh(one(@**)), @y)",
+        "delayed(block(@**), @y, then = @z)",
+        with_mh!("delayed(drift(one(@**), 0.7), @y, then = @z)"),
     ];
     /// Proposals from a few neighbours that are unrelated to the data.
     pub const NEIGHBOURS: &[&str] = &[

@@ -86,14 +86,15 @@ const SURROGATE: Case = Case {
     ..STRUCTURE
 };
 
-/// The same in two parts, of which the first stage leaves one out.
+/// The same in three parts, of which later stages compare two.
 const WAITING: Case = Case {
     name: "waiting",
     text: "assume c ~ flip(0.4);
            assume x = if c { a ~ categorical([1, 2, 1]); a }
                       else { b ~ gamma(2, 1); d ~ flip(0.3); if d { b } else { b + 1 } };
-           observe normal(x, sqrt(2)) = 2;
-           observe normal(x, sqrt(2)) = 2 with coarse = flat() as y;",
+           observe normal(x, sqrt(3)) = 2;
+           observe normal(x, sqrt(3)) = 2 with coarse = flat() as y;
+           observe normal(x, sqrt(3)) = 2 with coarse = flat() as z;",
     ..STRUCTURE
 };
 

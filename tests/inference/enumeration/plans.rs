@@ -110,6 +110,8 @@ pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream
     if !coarse.is_empty() {
         let (k, y) = (REVERSIBLE[rng.index(REVERSIBLE.len())], &coarse[rng.index(coarse.len())]);
         all.push(Plan::of("delayed", format!("delayed({k}, @{y});")));
+        let z = &coarse[rng.index(coarse.len())];
+        all.push(Plan::of("delayed", format!("delayed({k}, @{y}, then = @{z});")));
     }
     if let Some(own) = own(p, posterior, rng) {
         all.push(own);
