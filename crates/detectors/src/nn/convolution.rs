@@ -11,27 +11,27 @@ use pcadlang_numerics::num::simd::vectorised;
 
 /// The number of columns that are summed together, and of rows; of narrow convolutions, which
 /// have no more channels than the latter, the reverse.
-const WIDE: usize = 16;
+pub(super) const WIDE: usize = 16;
 const NARROW: usize = 8;
-const ROWS: [usize; 2] = [4, 8];
+pub(super) const ROWS: [usize; 2] = [4, 8];
 
 /// The number of values in the parts of rows that are summed before the next ones: they stay in
 /// the second cache while all panels pass.
-const VALUES: usize = 1 << 17;
+pub(super) const VALUES: usize = 1 << 17;
 
 /// A convolution with its weights and biases.
 #[derive(Debug)]
 pub(super) struct Convolution<'a> {
     pub window: Window,
-    channels: usize,
+    pub(super) channels: usize,
     /// The number of weights per channel: window rows x window columns x input channels.
     depth: usize,
-    weights: Weights<'a>,
+    pub(super) weights: Weights<'a>,
     /// Padded with zeros to whole panels.
-    biases: Vec<f32>,
+    pub(super) biases: Vec<f32>,
     /// Negative results are multiplied by this, from 0 to 1.
-    slope: f32,
-    clip: Clip,
+    pub(super) slope: f32,
+    pub(super) clip: Clip,
 }
 
 impl<'a> Convolution<'a> {
@@ -81,6 +81,9 @@ impl<'a> Convolution<'a> {
         patches: &mut Vec<f32>,
         out: &mut [f32],
     ) {
+        if self.is_tiled(from) {
+            return self.run_tiled(input, from, to, patches, out);
+        }
         let before = self.window.before(from, to);
         let pixels = VALUES / self.depth.clamp(1, DEEP);
         let each_pixel = self.window.is_pixel() && from.pixels() == to.pixels();
@@ -167,7 +170,7 @@ struct Rows<'a> {
 
 /// Adds the products of rows and columns to sums, which stay in registers.
 #[inline(always)]
-fn add_products<const P: usize, const R: usize>(
+pub(super) fn add_products<const P: usize, const R: usize>(
     mut sums: [[f32; P]; R],
     weights: &[[f32; P]],
     rows: [&[f32]; R],

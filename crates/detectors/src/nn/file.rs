@@ -83,7 +83,8 @@ impl<'a> File<'a> {
         let (numbers, sparsity) = self.stored(tensor)?;
         if let Some(sparsity) = sparsity {
             let dense = sparse::dense(&self.shapes[tensor], &sparsity, &numbers.all())?;
-            return Ok(Weights::Sparse(Sparse::new(&dense, channels)));
+            let sparse = Sparse::new(&dense, channels).map(Weights::Sparse);
+            return sparse.ok_or_else(|| NetworkError::TooLarge("a window's weights".into()));
         }
         match numbers.len() == self.size(tensor) {
             true => Ok(Weights::ByOutput(numbers)),

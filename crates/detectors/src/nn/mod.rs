@@ -24,6 +24,7 @@ mod sparse;
 pub(crate) mod tests;
 mod transposed;
 mod weights;
+mod winograd;
 
 pub use network::{Memory, Network};
 pub use operator::sigmoid;

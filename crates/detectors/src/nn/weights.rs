@@ -102,24 +102,25 @@ fn of_half(bits: u16) -> f32 {
 pub(super) struct Sparse {
     starts: Vec<usize>,
     /// The place of each among those of its channel.
-    places: Vec<u32>,
+    places: Vec<u16>,
     values: Vec<f32>,
 }
 
 impl Sparse {
-    /// Takes all weights of each channel, one channel after the other.
-    pub fn new(weights: &[f32], channels: usize) -> Sparse {
+    /// Takes all weights of each channel, one channel after the other; `None` if there are too
+    /// many for a channel.
+    pub fn new(weights: &[f32], channels: usize) -> Option<Sparse> {
         let mut sparse = Sparse { starts: vec![0], places: Vec::new(), values: Vec::new() };
         for row in weights.chunks_exact((weights.len() / channels.max(1)).max(1)) {
             for (k, w) in row.iter().enumerate().filter(|(_, w)| **w != 0.0) {
-                sparse.places.push(k as u32);
+                sparse.places.push(u16::try_from(k).ok()?);
                 sparse.values.push(*w);
             }
             sparse.starts.push(sparse.values.len());
         }
         sparse.places.shrink_to_fit();
         sparse.values.shrink_to_fit();
-        sparse
+        Some(sparse)
     }
 }
 
@@ -158,9 +159,9 @@ impl Weights<'_> {
                 for o in 0..width {
                     let channel = s.starts[first + o]..s.starts[first + o + 1];
                     let (places, values) = (&s.places[channel.clone()], &s.values[channel]);
-                    let from = places.partition_point(|k| (*k as usize) < start);
+                    let from = places.partition_point(|k| usize::from(*k) < start);
                     for (k, w) in places[from..].iter().zip(&values[from..]) {
-                        let Some(row) = panel.get_mut(*k as usize - start) else { break };
+                        let Some(row) = panel.get_mut(usize::from(*k) - start) else { break };
                         row[o] = *w;
                     }
                 }
