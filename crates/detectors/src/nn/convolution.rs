@@ -72,29 +72,37 @@ impl<'a> Convolution<'a> {
         self.slope == 1.0 && self.clip == Clip::NONE
     }
 
+    /// The number of elements that [`Convolution::run`] needs for parts of the image.
+    pub fn memory(&self, from: Size, to: Size) -> usize {
+        match (self.is_tiled(from), self.takes_pixels(from, to)) {
+            (true, _) => self.tiling(from, to).size(),
+            (_, true) => 0,
+            _ => self.pixels().min(to.pixels()) * self.depth.min(DEEP),
+        }
+    }
+
+    /// The number of pixels that are computed together.
+    fn pixels(&self) -> usize {
+        VALUES / self.depth.clamp(1, DEEP)
+    }
+
+    /// True if each pixel is a row to multiply.
+    fn takes_pixels(&self, from: Size, to: Size) -> bool {
+        self.window.is_pixel() && from.pixels() == to.pixels()
+    }
+
     /// Fills `out`; `patches` is memory for parts of the image.
-    pub fn run(
-        &self,
-        input: &[f32],
-        from: Size,
-        to: Size,
-        patches: &mut Vec<f32>,
-        out: &mut [f32],
-    ) {
+    pub fn run(&self, input: &[f32], from: Size, to: Size, patches: &mut [f32], out: &mut [f32]) {
         if self.is_tiled(from) {
             return self.run_tiled(input, from, to, patches, out);
         }
         let before = self.window.before(from, to);
-        let pixels = VALUES / self.depth.clamp(1, DEEP);
-        let each_pixel = self.window.is_pixel() && from.pixels() == to.pixels();
-        if !each_pixel {
-            patches.resize((pixels * self.depth.min(DEEP)).max(patches.len()), 0.0);
-        }
+        let (pixels, takes_pixels) = (self.pixels(), self.takes_pixels(from, to));
         for (i, out) in out.chunks_mut(pixels * self.channels).enumerate() {
             let (first, count) = (i * pixels, out.len() / self.channels);
             for start in (0..self.depth).step_by(DEEP) {
                 let part = start..(start + DEEP).min(self.depth);
-                if each_pixel {
+                if takes_pixels {
                     let rows = &input[first * self.depth..][..count * self.depth];
                     self.product(Rows { values: rows, depth: self.depth, at: start }, part, out);
                     continue;

@@ -6,13 +6,10 @@ use super::plan::Plan;
 use core::ops::Range;
 use std::collections::HashMap;
 
-/// The memory in which networks run, one run after the other.
+/// The memory in which networks run, one run after the other: tensors, and behind them what an
+/// operator needs while it runs.
 #[derive(Debug, Default)]
-pub struct Memory {
-    tensors: Vec<f32>,
-    /// The parts of images that a convolution multiplies.
-    patches: Vec<f32>,
-}
+pub struct Memory(Vec<f32>);
 
 /// The number of elements for which memory is asked at least. Allocators map so large a block
 /// apart and give it back when it is freed, what was never used of it is never there, and they
@@ -20,13 +17,13 @@ pub struct Memory {
 const ASKED: usize = if cfg!(target_family = "wasm") { 0 } else { 9 << 20 };
 
 impl Memory {
-    fn tensors(&mut self, size: usize) -> (&mut [f32], &mut Vec<f32>) {
-        if self.tensors.len() < size {
+    fn take(&mut self, size: usize) -> &mut [f32] {
+        if self.0.len() < size {
             // The old block first.
-            self.tensors = Vec::new();
-            self.tensors = vec![0.0; size.max(ASKED)];
+            self.0 = Vec::new();
+            self.0 = vec![0.0; size.max(ASKED)];
         }
-        (&mut self.tensors[..size], &mut self.patches)
+        &mut self.0[..size]
     }
 }
 
@@ -139,7 +136,12 @@ impl Network<'_> {
         let kept = self.outputs.iter().zip(wanted).map(|(o, wanted)| wanted.then_some(*o));
         let kept: Vec<Option<usize>> = kept.collect();
         let plan = Plan::new(&self.layers, &self.shapes, self.input, &kept);
-        let (tensors, patches) = memory.tensors(plan.size);
+        let own = |(i, _): &(usize, Option<usize>)| {
+            let Layer { operator, inputs, output } = &self.layers[*i];
+            inputs.first().map_or(0, |t| operator.memory(&self.shapes[*t], &self.shapes[*output]))
+        };
+        let most = plan.steps.iter().map(own).max().unwrap_or(0);
+        let (tensors, own) = memory.take(plan.size + most).split_at_mut(plan.size);
         fill(&mut tensors[plan.places[self.input].clone()]);
         for (i, within) in &plan.steps {
             let layer = &self.layers[*i];
@@ -162,7 +164,7 @@ impl Network<'_> {
                 }
                 None => {
                     let inputs: Vec<Tensor> = layer.inputs.iter().map(tensor).collect();
-                    layer.operator.run(&inputs, &self.shapes[layer.output], patches, out);
+                    layer.operator.run(&inputs, &self.shapes[layer.output], own, out);
                 }
             }
         }

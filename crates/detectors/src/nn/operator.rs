@@ -61,14 +61,12 @@ pub fn sigmoid(x: f32) -> f32 {
 
 impl Operator<'_> {
     /// Fills `out`, of this shape, from the inputs. Shapes were checked when the network
-    /// was read. `patches` is memory for parts of images.
-    pub fn run(&self, inputs: &[Tensor], shape: &[usize], patches: &mut Vec<f32>, out: &mut [f32]) {
+    /// was read. `own` is memory of the operator's, [`Operator::memory`] elements or more.
+    pub fn run(&self, inputs: &[Tensor], shape: &[usize], own: &mut [f32], out: &mut [f32]) {
         let Some(first) = inputs.first() else { return };
         let pictures = Size::of(first.shape).zip(Size::of(shape));
         match (self, pictures) {
-            (Operator::Convolution(c), Some((from, to))) => {
-                c.run(first.values, from, to, patches, out)
-            }
+            (Operator::Convolution(c), Some((from, to))) => c.run(first.values, from, to, own, out),
             (Operator::Depthwise(c), Some((from, to))) => c.run(first.values, from, to, out),
             (Operator::Transposed(c), Some((from, to))) => c.run(first.values, from, to, out),
             (Operator::Pad { before, value }, Some((from, to))) => {
@@ -107,6 +105,14 @@ impl Operator<'_> {
             (Operator::HardSwish, _) => each(first.values, out, hard_swish),
             // Rejected when the network was read.
             (_, None) => {}
+        }
+    }
+
+    /// The number of elements that it needs while it runs, beside inputs and output.
+    pub fn memory(&self, input: &[usize], output: &[usize]) -> usize {
+        match (self, Size::of(input).zip(Size::of(output))) {
+            (Operator::Convolution(c), Some((from, to))) => c.memory(from, to),
+            _ => 0,
         }
     }
 

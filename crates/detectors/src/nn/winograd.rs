@@ -18,15 +18,35 @@ const PLACES: usize = SIDE * SIDE;
 const TILES: usize = 48;
 const NONE: Lanes = [0.0; WIDE];
 
-/// How far what belongs to one place of tiles is from the next: no multiples of a power of two,
-/// which would share a few lines of the cache.
-struct Apart {
+/// The most channels of an input: tiles of more would take too much memory.
+const DEEPEST: usize = 512;
+
+/// How an image is divided into tiles, and how far what belongs to one place of tiles is from the
+/// next: no multiples of a power of two, which would share a few lines of the cache.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tiling {
+    /// The number of tiles in a row, in all, and of those that are computed together.
+    across: usize,
+    all: usize,
+    tiles: usize,
     /// In panels of weights.
     weights: usize,
     /// In numbers.
     seen: usize,
     /// In panels of sums.
     products: usize,
+}
+
+impl Tiling {
+    /// The number of elements for weights as stored and prepared, for tiles, and for products.
+    fn lens(&self) -> [usize; 3] {
+        let products = PLACES * self.products * WIDE;
+        [(9 + PLACES) * self.weights * WIDE, PLACES * self.seen, products]
+    }
+
+    pub fn size(&self) -> usize {
+        self.lens().into_iter().sum()
+    }
 }
 
 /// Some channels.
@@ -36,35 +56,42 @@ impl Convolution<'_> {
     /// True if results are computed by tiles: of windows that it is about, if channels fill lanes.
     pub fn is_tiled(&self, from: Size) -> bool {
         let shape = (self.window.size, self.window.stride) == ([3, 3], [1, 1]);
-        shape && from.channels.is_multiple_of(WIDE) && self.channels >= WIDE
+        let fills = from.channels.is_multiple_of(WIDE) && from.channels <= DEEPEST;
+        shape && fills && self.channels >= WIDE
     }
 
-    /// Fills `out`; `memory` is for tiles and weights.
+    /// Divides an image.
+    pub fn tiling(&self, from: Size, to: Size) -> Tiling {
+        let across = to.width.div_ceil(STEP);
+        let all = to.height.div_ceil(STEP) * across;
+        let most = (VALUES / (PLACES * from.channels)).max(TILES).next_multiple_of(ROWS[0]);
+        let tiles = most.min(all.next_multiple_of(ROWS[0]));
+        Tiling {
+            across,
+            all,
+            tiles,
+            weights: from.channels + 1,
+            seen: tiles * from.channels + WIDE,
+            products: tiles + 1,
+        }
+    }
+
+    /// Fills `out`; `memory` is for a [`Tiling`].
     pub fn run_tiled(
         &self,
         input: &[f32],
         from: Size,
         to: Size,
-        memory: &mut Vec<f32>,
+        memory: &mut [f32],
         out: &mut [f32],
     ) {
         let before = self.window.before(from, to);
-        let across = to.width.div_ceil(STEP);
-        let all = to.height.div_ceil(STEP) * across;
-        let most = (VALUES / (PLACES * from.channels)).max(TILES).next_multiple_of(ROWS[0]);
-        let tiles = most.min(all.next_multiple_of(ROWS[0]));
-        let apart = Apart {
-            weights: from.channels + 1,
-            seen: tiles * from.channels + WIDE,
-            products: tiles + 1,
-        };
-        let lens = [(9 + PLACES) * apart.weights * WIDE, PLACES * apart.seen];
-        let size = lens[0] + lens[1] + PLACES * apart.products * WIDE;
-        if memory.len() < size {
-            memory.resize(size, 0.0);
-        }
-        let (weights, rest) = memory[..size].split_at_mut(lens[0]);
-        let (seen, products) = rest.split_at_mut(lens[1]);
+        let apart = self.tiling(from, to);
+        let Tiling { across, all, tiles, .. } = apart;
+        let [weights, seen, products] = apart.lens();
+        let (weights, rest) = memory.split_at_mut(weights);
+        let (seen, rest) = rest.split_at_mut(seen);
+        let products = &mut rest[..products];
         for start in (0..all).step_by(tiles) {
             let count = tiles.min(all - start);
             let place = |tile: usize| [tile / across, tile % across].map(|i| STEP * i);
@@ -98,7 +125,7 @@ impl Convolution<'_> {
         first: usize,
         weights: &mut [f32],
         (seen, count): (&[f32], usize),
-        apart: &Apart,
+        apart: &Tiling,
         products: &mut [f32],
     ) {
         let (stored, weights) = weights.split_at_mut(9 * apart.weights * WIDE);

@@ -83,8 +83,9 @@ fn convolutions() {
             let stored = Weights::ByOutput(Numbers::new(Kind::Float, &bytes));
             let c = Convolution::new(w, (stored, depth), &biases, clip);
             let (mut out, mut plain) = (vec![9.0; to.len()], vec![9.0; to.len()]);
-            c.run(&x, from, to, &mut Vec::new(), &mut out);
-            portable(|| c.run(&x, from, to, &mut Vec::new(), &mut plain));
+            let mut own = vec![5.0; c.memory(from, to)];
+            c.run(&x, from, to, &mut own, &mut out);
+            portable(|| c.run(&x, from, to, &mut own, &mut plain));
             assert_eq!(out, plain, "the same bits with narrow instructions");
             let [top, left] = before(&w, from, to);
             let mut expected = Vec::new();
@@ -136,7 +137,7 @@ fn convolutions_whatever_the_form_of_weights_and_padding() {
         let run = |window: Window, weights: Weights, x: &[f32], from: Size| {
             let c = Convolution::new(window, (weights, depth), &biases, FREE);
             let mut out = vec![9.0; to.len()];
-            c.run(x, from, to, &mut vec![5.0; 3], &mut out);
+            c.run(x, from, to, &mut vec![5.0; c.memory(from, to)], &mut out);
             out
         };
         let plain = Weights::ByOutput(Numbers::new(Kind::Float, &floats));
@@ -225,7 +226,7 @@ fn transposed_convolutions() {
         let (x, y) = (numbers(from.len(), 1), numbers(to.len(), 2));
         let (mut up, mut down) = (vec![0.0; to.len()], vec![0.0; from.len()]);
         t.run(&x, from, to, &mut up);
-        c.run(&y, to, from, &mut Vec::new(), &mut down);
+        c.run(&y, to, from, &mut vec![5.0; c.memory(to, from)], &mut down);
         let product = |a: &[f32], b: &[f32]| {
             a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum::<f64>()
         };
