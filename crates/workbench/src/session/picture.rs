@@ -54,7 +54,7 @@ pub fn over(view: &Arc<View>, photo: Option<&RgbImage>, (width, height): (u32, u
     let picture = match side == width.max(height) {
         true => view.frame(side),
         // Of a view apart, so that the larger picture is not kept.
-        false => View::new(view.solid().clone(), view.camera().clone()).frame(side),
+        false => View::new(view.solid().clone(), *view.camera()).frame(side),
     };
     let mut out = pictures::overlay(photo, &picture, &contours.slice());
     drop(picture);
