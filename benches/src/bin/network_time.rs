@@ -18,10 +18,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     for file in &files {
         let bytes = std::fs::read(file)?;
-        let network = match file.strip_suffix(".json") {
-            Some(name) => {
-                Network::read_graph_model(&bytes, &std::fs::read(format!("{name}.bin"))?)?
-            }
+        let weights = match file.strip_suffix(".json") {
+            Some(name) => Some(std::fs::read(format!("{name}.bin"))?),
+            None => None,
+        };
+        let network = match &weights {
+            Some(weights) => Network::read_graph_model(&bytes, weights)?,
             None => Network::read(&bytes)?,
         };
         let input = vec![0.5; network.input_shape().iter().product()];

@@ -141,11 +141,9 @@ fn main() -> Result<(), String> {
         let bytes = std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?;
         let photo = photo::decode(&bytes, &Limits::default()).map_err(|e| e.to_string())?;
         let wide = ObjectOptions { least: 0.05, most: usize::MAX };
-        let seen =
-            boxes.find_in_views(&photo, VIEWS_OF_PEOPLE, &wide).map_err(|e| e.to_string())?;
+        let seen = boxes.find_in_views(&photo, VIEWS_OF_PEOPLE, &wide);
         let options = FindOptions { most: 20, sure, ..FindOptions::default() };
         let people = finder.find(&photo, Search::Everywhere(&seen), &options, 0);
-        let people = people.map_err(|e| e.to_string())?;
         let annotations = data["annotations"].as_array().ok_or("no annotations")?;
         let all: Vec<Truth> =
             annotations.iter().filter(|a| a["image_id"] == image["id"]).map(truth).collect();

@@ -116,16 +116,13 @@ fn detect_people(a: &Detect, photo: &Photo) -> Result<(), Failure> {
     let wide = ObjectOptions { most: usize::MAX, ..ObjectOptions::default() };
     let objects = match a.bounds {
         Some(_) => Vec::new(),
-        None => objects::networks::finder()
-            .map_err(plain)?
-            .find_in_views(photo, VIEWS_OF_PEOPLE, &wide)
-            .map_err(|e| plain(e.to_string()))?,
+        None => {
+            objects::networks::finder().map_err(plain)?.find_in_views(photo, VIEWS_OF_PEOPLE, &wide)
+        }
     };
     let within = a.bounds.map(|b| Search::Within(sides(b)));
     let search = within.unwrap_or(Search::Everywhere(&objects));
-    let people = inputs::finder(a.models.as_deref())?
-        .find(photo, search, &options, a.threads)
-        .map_err(|e| plain(e.to_string()))?;
+    let people = inputs::finder(a.models.as_deref())?.find(photo, search, &options, a.threads);
     let size = (photo.width(), photo.height());
     let file = match a.format {
         PeopleFormat::Coco => json::coco(&people, size, &name(a), a.image_id),
@@ -142,9 +139,7 @@ fn detect_people(a: &Detect, photo: &Photo) -> Result<(), Failure> {
 /// Detects the objects in a photograph, and lists them with the colours of their boxes.
 fn detect_objects(a: &Detect, photo: &Photo) -> Result<(), Failure> {
     let finder = objects::networks::finder().map_err(plain)?;
-    let found = finder
-        .find(photo, View::WHOLE, &ObjectOptions::default())
-        .map_err(|e| plain(e.to_string()))?;
+    let found = finder.find(photo, View::WHOLE, &ObjectOptions::default());
     let file = objects::json::coco(&found, (photo.width(), photo.height()), &name(a), a.image_id);
     write(a, "objects.json", &format!("{file:#}\n"), || boxes(photo, &found))?;
     match found.len() {

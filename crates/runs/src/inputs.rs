@@ -14,7 +14,6 @@ use pcadlang_library::{Model, Program, standard};
 use pcadlang_scene::cameras::CameraFile;
 use pcadlang_scene::render::Camera;
 use pcadlang_scene::vision::{self, ContourMap, Photo};
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
@@ -404,12 +403,17 @@ const LANDMARKS: [&str; 3] =
     ["pose_landmark_heavy.tflite", "pose_landmark_full.tflite", "pose_landmark_lite.tflite"];
 const DETECTION: &str = "pose_detection.tflite";
 
+/// Reads a file that is kept as long as the process runs.
+fn kept(path: &Path) -> Result<&'static [u8], Failure> {
+    Ok(files::read(path)?.leak())
+}
+
 /// Loads the networks of a folder, or else the built-in ones.
 pub fn finder(folder: Option<&Path>) -> Result<PeopleFinder, Failure> {
     let (detection, landmarks, from) = match folder {
         None => {
             let (detection, landmarks) = networks::files();
-            (Cow::Borrowed(detection), Cow::Borrowed(landmarks), "the program's own".to_owned())
+            (detection, landmarks, "the program's own".to_owned())
         }
         Some(folder) => {
             let best =
@@ -423,11 +427,11 @@ pub fn finder(folder: Option<&Path>) -> Result<PeopleFinder, Failure> {
             // The detection network is the same for all landmark networks.
             let path = folder.join(DETECTION);
             let detection = match path.exists() {
-                true => Cow::Owned(files::read(&path)?),
-                false => Cow::Borrowed(networks::files().0),
+                true => kept(&path)?,
+                false => networks::files().0,
             };
-            (detection, Cow::Owned(files::read(&best)?), folder.display().to_string())
+            (detection, kept(&best)?, folder.display().to_string())
         }
     };
-    PeopleFinder::new(&detection, &landmarks).map_err(|e| plain(format!("{from}: {e}")))
+    PeopleFinder::new(detection, landmarks).map_err(|e| plain(format!("{from}: {e}")))
 }

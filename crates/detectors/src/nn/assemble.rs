@@ -2,13 +2,15 @@
 //! that running them cannot fail.
 
 use super::NetworkError;
-use super::convolution::{Convolution, Depthwise, Transposed};
+use super::convolution::Convolution;
+use super::depthwise::Depthwise;
 use super::file::File;
 use super::flatbuffer::Table;
 use super::operator::Operator;
 use super::resampling::Alignment;
 use super::schema::{TRANSPOSED, code};
 use super::shape::{Clip, Size, Window};
+use super::transposed::Transposed;
 
 /// The maximum side of a window, and the maximum stride.
 pub(super) const LONGEST: usize = 64;
@@ -69,7 +71,8 @@ impl<'a> Entry<'a> {
             1 => false,
             _ => return Err("unknown padding".into()),
         };
-        Ok(Window { size, stride: [self.size(2, 1)?, self.size(1, 1)?], same })
+        let stride = [self.size(2, 1)?, self.size(1, 1)?];
+        Ok(Window { size, stride, same, shift: [0, 0] })
     }
 
     fn clip(&self, i: usize) -> Checked<Clip> {
@@ -82,14 +85,14 @@ impl<'a> Entry<'a> {
     }
 }
 
-impl File<'_> {
+impl<'a> File<'a> {
     /// Returns the operator of an entry, and the inputs that it reads when it runs.
-    pub fn operator(&mut self, e: &Entry) -> Checked<(Operator, Vec<usize>)> {
+    pub fn operator(&mut self, e: &Entry) -> Checked<(Operator<'a>, Vec<usize>)> {
         let first = *e.inputs.first().ok_or("it has no input")?;
         let (input, output) = (self.shapes[first].clone(), self.shapes[e.output].clone());
         let pictures =
             || Size::of(&input).zip(Size::of(&output)).ok_or("its tensors are not single images");
-        let one = |operator: Operator| Ok((operator, vec![first]));
+        let one = |operator: Operator<'a>| Ok((operator, vec![first]));
         let fits = |holds: bool| {
             if holds {
                 Ok(())
@@ -113,13 +116,15 @@ impl File<'_> {
                 fits(window.output(from, to.channels) == Some(to))?;
                 let clip = e.clip(clip_at)?;
                 let biases = self.biases(e, to.channels)?;
-                let weights = self.numbers(weights)?;
                 if e.code == code::CONVOLUTION {
                     fits((outer, inner) == (to.channels, from.channels))?;
+                    let depth = height * width * inner;
+                    let weights = (self.weights(weights, to.channels)?, depth);
                     return one(Operator::Convolution(Convolution::new(
-                        window, &weights, &biases, clip,
+                        window, weights, &biases, clip,
                     )));
                 }
+                let weights = self.numbers(weights)?;
                 fits((outer, inner) == (1, to.channels) && from.channels == to.channels)?;
                 one(Operator::Depthwise(Depthwise { window, weights, biases, clip }))
             }
@@ -134,7 +139,7 @@ impl File<'_> {
                 let stride = [to.height / from.height, to.width / from.width];
                 fits(stride.iter().all(|s| (1..=LONGEST).contains(s)))?;
                 fits([height, width].iter().all(|s| (1..=LONGEST).contains(s)))?;
-                let window = Window { size: [height, width], stride, same: true };
+                let window = Window { size: [height, width], stride, same: true, shift: [0, 0] };
                 let biases = self.biases(e, to.channels)?;
                 let weights = self.numbers(weights)?;
                 let transposed = Transposed { window, weights, biases };

@@ -5,7 +5,7 @@ use super::flatbuffer::Table;
 use super::network::MOST_NUMBERS;
 use super::schema::field;
 use super::sparse;
-use half::slice::HalfFloatSliceExt;
+use super::weights::{Kind, Numbers, Sparse, Weights};
 use std::collections::HashMap;
 
 type Result<T> = core::result::Result<T, NetworkError>;
@@ -23,6 +23,10 @@ pub(super) struct File<'a> {
 
 pub(super) fn format(why: &str) -> NetworkError {
     NetworkError::Format(why.into())
+}
+
+fn wrong_length() -> NetworkError {
+    format("the number of values of a constant does not match its shape")
 }
 
 fn shape(tensor: &Table) -> Result<Vec<usize>> {
@@ -46,7 +50,7 @@ impl<'a> File<'a> {
     }
 
     /// Returns a constant's stored tensor, and its bytes in the file's form.
-    fn constant(&self, mut tensor: usize) -> Result<(usize, &[u8])> {
+    fn constant(&self, mut tensor: usize) -> Result<(usize, &'a [u8])> {
         for _ in 0..=self.same.len() {
             match self.same.get(&tensor) {
                 Some(from) => tensor = *from,
@@ -63,38 +67,57 @@ impl<'a> File<'a> {
 
     /// Returns a constant's elements.
     pub fn numbers(&mut self, tensor: usize) -> Result<Vec<f32>> {
+        let (numbers, sparsity) = self.stored(tensor)?;
+        let values = match sparsity {
+            Some(sparsity) => sparse::dense(&self.shapes[tensor], &sparsity, &numbers.all())?,
+            None => numbers.all(),
+        };
+        match values.len() == self.size(tensor) {
+            true => Ok(values),
+            false => Err(wrong_length()),
+        }
+    }
+
+    /// Returns the weights of a convolution, those of each output channel together.
+    pub fn weights(&mut self, tensor: usize, channels: usize) -> Result<Weights<'a>> {
+        let (numbers, sparsity) = self.stored(tensor)?;
+        if let Some(sparsity) = sparsity {
+            let dense = sparse::dense(&self.shapes[tensor], &sparsity, &numbers.all())?;
+            let sparse = Sparse::new(&dense, channels).map(Weights::Sparse);
+            return sparse.ok_or_else(|| NetworkError::TooLarge("a window's weights".into()));
+        }
+        match numbers.len() == self.size(tensor) {
+            true => Ok(Weights::ByOutput(numbers)),
+            false => Err(wrong_length()),
+        }
+    }
+
+    fn size(&self, tensor: usize) -> usize {
+        self.shapes[tensor].iter().product()
+    }
+
+    /// Returns a constant's numbers as they are stored, all of them finite, and how they are laid
+    /// out if they are sparse.
+    fn stored(&mut self, tensor: usize) -> Result<(Numbers<'a>, Option<Table<'a>>)> {
         let (from, bytes) = self.constant(tensor)?;
-        let (table, shape) = (self.tensors[from], &self.shapes[from]);
-        let values: Vec<f32> = match table.u8(field::tensor::KIND)? {
-            0 => bytes
-                .chunks_exact(4)
-                .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
-                .collect(),
-            1 => {
-                let halves = bytes.chunks_exact(2).map(|b| half::f16::from_le_bytes([b[0], b[1]]));
-                let halves: Vec<half::f16> = halves.collect();
-                halves.to_f32_vec()
-            }
+        let table = self.tensors[from];
+        let kind = match table.u8(field::tensor::KIND)? {
+            0 => Kind::Float,
+            1 => Kind::Half,
             _ => return Err(format("a constant is not of 32- or 16-bit floats")),
         };
-        let size: usize = shape.iter().product();
+        let (size, numbers) = (self.size(from), Numbers::new(kind, bytes));
         self.left = self
             .left
             .checked_sub(size)
             .ok_or_else(|| NetworkError::TooLarge("its constants".into()))?;
-        let values = match table.table(field::tensor::SPARSITY)? {
-            Some(sparsity) => sparse::dense(shape, &sparsity, &values)?,
-            None => values,
-        };
-        let is_whole =
-            values.len() == size && size == self.shapes[tensor].iter().product::<usize>();
-        if !is_whole {
-            return Err(format("the number of values of a constant does not match its shape"));
+        if size != self.size(tensor) {
+            return Err(wrong_length());
         }
-        if values.iter().any(|v| !v.is_finite()) {
+        if !numbers.are_finite() {
             return Err(format("a constant is not finite"));
         }
-        Ok(values)
+        Ok((numbers, table.table(field::tensor::SPARSITY)?))
     }
 
     /// Returns a constant's integer elements.

@@ -7,12 +7,14 @@
 
 mod assemble;
 mod convolution;
+mod depthwise;
 mod file;
 mod flatbuffer;
 mod fuse;
 mod graph_model;
 mod network;
 mod operator;
+mod plan;
 mod read;
 mod resampling;
 mod schema;
@@ -20,8 +22,11 @@ mod shape;
 mod sparse;
 #[cfg(test)]
 pub(crate) mod tests;
+mod transposed;
+mod weights;
+mod winograd;
 
-pub use network::Network;
+pub use network::{Memory, Network};
 pub use operator::sigmoid;
 
 /// The reason why a file cannot be run as a network, or why an input does not fit.

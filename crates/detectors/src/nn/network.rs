@@ -2,26 +2,47 @@
 
 use super::NetworkError;
 use super::operator::{Operator, Tensor};
+use super::plan::Plan;
+use core::ops::Range;
 use std::collections::HashMap;
 
-/// A network read from a file.
+/// The memory in which networks run, one run after the other: tensors, and behind them what an
+/// operator needs while it runs.
+#[derive(Debug, Default)]
+pub struct Memory(Vec<f32>);
+
+/// The number of elements for which memory is asked at least. Allocators map so large a block
+/// apart and give it back when it is freed, what was never used of it is never there, and they
+/// do not take its size as a reason to keep smaller ones.
+const ASKED: usize = if cfg!(target_family = "wasm") { 0 } else { 9 << 20 };
+
+impl Memory {
+    fn take(&mut self, size: usize) -> &mut [f32] {
+        if self.0.len() < size {
+            // The old block first.
+            self.0 = Vec::new();
+            self.0 = vec![0.0; size.max(ASKED)];
+        }
+        &mut self.0[..size]
+    }
+}
+
+/// A network read from a file, of which its weights are a part.
 #[derive(Debug)]
-pub struct Network {
-    layers: Vec<Layer>,
+pub struct Network<'a> {
+    layers: Vec<Layer<'a>>,
     /// The shape of each tensor.
     shapes: Vec<Vec<usize>>,
     constants: HashMap<usize, Vec<f32>>,
     input: usize,
     outputs: Vec<usize>,
-    /// For each tensor, the last step that reads it; `usize::MAX` for outputs.
-    last: Vec<usize>,
     work: usize,
 }
 
 /// An operator with the tensors it reads and the one it writes.
 #[derive(Debug)]
-pub(super) struct Layer {
-    pub operator: Operator,
+pub(super) struct Layer<'a> {
+    pub operator: Operator<'a>,
     pub inputs: Vec<usize>,
     pub output: usize,
 }
@@ -57,22 +78,19 @@ impl Effort {
     }
 
     /// Returns the network of operators that were added, each after those it reads.
-    pub fn network(
+    pub fn network<'a>(
         self,
-        layers: Vec<Layer>,
+        layers: Vec<Layer<'a>>,
         shapes: Vec<Vec<usize>>,
         constants: HashMap<usize, Vec<f32>>,
         input: usize,
         outputs: Vec<usize>,
-    ) -> Network {
-        let mut last = vec![0; shapes.len()];
-        layers.iter().enumerate().for_each(|(i, s)| s.inputs.iter().for_each(|t| last[*t] = i));
-        outputs.iter().for_each(|o| last[*o] = usize::MAX);
-        Network { layers, shapes, constants, input, outputs, last, work: self.work }
+    ) -> Network<'a> {
+        Network { layers, shapes, constants, input, outputs, work: self.work }
     }
 }
 
-impl Network {
+impl Network<'_> {
     /// The shape of the input, usually 1, height, width, channels.
     pub fn input_shape(&self) -> &[usize] {
         &self.shapes[self.input]
@@ -94,53 +112,69 @@ impl Network {
     /// # Errors
     /// If the input's length does not match its shape.
     pub fn run(&self, input: Vec<f32>) -> Result<Vec<Vec<f32>>, NetworkError> {
-        let expected = self.input_shape().iter().product();
+        let expected = self.input_len();
         if input.len() != expected {
             return Err(NetworkError::Input { expected, got: input.len() });
         }
-        let mut values: Vec<Option<Vec<f32>>> = vec![None; self.shapes.len()];
-        values[self.input] = Some(input);
-        // Buffers of tensors that are no longer needed.
-        let mut free: Vec<Vec<f32>> = Vec::new();
-        for (i, layer) in self.layers.iter().enumerate() {
-            let shape = &self.shapes[layer.output];
-            let mut out = reuse(&mut free, shape.iter().product());
-            let tensor = |t: &usize| {
-                let values = values[*t].as_ref().or_else(|| self.constants.get(t));
-                Tensor { shape: &self.shapes[*t], values: values.map_or(&[], |v| v) }
-            };
-            let inputs: Vec<Tensor> = layer.inputs.iter().map(tensor).collect();
-            layer.operator.run(&inputs, shape, &mut out);
-            values[layer.output] = Some(out);
-            for t in layer.inputs.iter().filter(|t| self.last[**t] == i) {
-                free.extend(values[*t].take());
-            }
-        }
-        Ok(self.outputs.iter().map(|o| values[*o].clone().unwrap_or_default()).collect())
+        let (wanted, mut memory) = (vec![true; self.outputs.len()], Memory::default());
+        let outputs = self.run_in(&mut memory, &wanted, |place| place.copy_from_slice(&input));
+        Ok(outputs.into_iter().map(<[f32]>::to_vec).collect())
     }
-}
 
-/// Returns a list of this length with arbitrary values, reusing the smallest buffer that
-/// is large enough, and not more than twice that. If none is, the largest is freed, so that
-/// they do not pile up.
-fn reuse(free: &mut Vec<Vec<f32>>, len: usize) -> Vec<f32> {
-    let fits = free
-        .iter()
-        .enumerate()
-        .filter(|(_, v)| v.capacity() >= len && v.capacity() / 2 <= len)
-        .min_by_key(|(_, v)| v.capacity());
-    match fits.map(|(i, _)| i) {
-        Some(i) => {
-            let mut v = free.swap_remove(i);
-            v.resize(len, 0.0);
-            v
-        }
-        None => {
-            let largest = (0..free.len()).max_by_key(|i| free[*i].capacity());
-            if let Some(i) = largest {
-                drop(free.swap_remove(i));
+    fn input_len(&self) -> usize {
+        self.input_shape().iter().product()
+    }
+
+    /// Returns the outputs that are wanted, in the file's order, for an input that `fill` writes;
+    /// others are empty, and what only they need is not computed.
+    pub fn run_in<'m>(
+        &'m self,
+        memory: &'m mut Memory,
+        wanted: &[bool],
+        fill: impl FnOnce(&mut [f32]),
+    ) -> Vec<&'m [f32]> {
+        let kept = self.outputs.iter().zip(wanted).map(|(o, wanted)| wanted.then_some(*o));
+        let kept: Vec<Option<usize>> = kept.collect();
+        let plan = Plan::new(&self.layers, &self.shapes, self.input, &kept);
+        let own = |(i, _): &(usize, Option<usize>)| {
+            let Layer { operator, inputs, output } = &self.layers[*i];
+            inputs.first().map_or(0, |t| operator.memory(&self.shapes[*t], &self.shapes[*output]))
+        };
+        let most = plan.steps.iter().map(own).max().unwrap_or(0);
+        let (tensors, own) = memory.take(plan.size + most).split_at_mut(plan.size);
+        fill(&mut tensors[plan.places[self.input].clone()]);
+        for (i, within) in &plan.steps {
+            let layer = &self.layers[*i];
+            let place = plan.places[layer.output].clone();
+            let (before, rest) = tensors.split_at_mut(place.start);
+            let (out, after) = rest.split_at_mut(place.len());
+            let tensor = |t: &usize| {
+                let Range { start, end } = plan.places[*t];
+                let values = match self.constants.get(t) {
+                    Some(values) => values,
+                    None if end <= place.start => &before[start..end],
+                    None => &after[start - place.end..end - place.end],
+                };
+                Tensor { shape: &self.shapes[*t], values }
+            };
+            match within {
+                Some(k) => {
+                    let other = layer.inputs.iter().enumerate().find(|(j, _)| j != k);
+                    layer.operator.run_within(other.map(|(_, t)| tensor(t)), out);
+                }
+                None => {
+                    let inputs: Vec<Tensor> = layer.inputs.iter().map(tensor).collect();
+                    layer.operator.run(&inputs, &self.shapes[layer.output], own, out);
+                }
             }
-            vec![0.0; len]
         }
+        let tensors = &*tensors;
+        let output = |o: &Option<usize>| {
+            o.map_or(&[][..], |o| match self.constants.get(&o) {
+                Some(values) => values,
+                None => &tensors[plan.places[o].clone()],
+            })
+        };
+        kept.iter().map(output).collect()
     }
 }

@@ -1,13 +1,15 @@
 //! The operators of a network, on tensors.
 
-use super::convolution::{Convolution, Depthwise, Transposed};
+use super::convolution::Convolution;
+use super::depthwise::Depthwise;
 use super::resampling::{self, Alignment};
 use super::shape::{Clip, Size, Window};
+use super::transposed::Transposed;
 
 /// An operator with its parameters.
 #[derive(Debug)]
-pub(super) enum Operator {
-    Convolution(Convolution),
+pub(super) enum Operator<'a> {
+    Convolution(Convolution<'a>),
     Depthwise(Depthwise),
     Transposed(Transposed),
     /// A value around an image: the numbers above, to the left, and before the first
@@ -57,14 +59,14 @@ pub fn sigmoid(x: f32) -> f32 {
     1.0 / (1.0 + libm::expf(-x))
 }
 
-impl Operator {
+impl Operator<'_> {
     /// Fills `out`, of this shape, from the inputs. Shapes were checked when the network
-    /// was read.
-    pub fn run(&self, inputs: &[Tensor], shape: &[usize], out: &mut [f32]) {
+    /// was read. `own` is memory of the operator's, [`Operator::memory`] elements or more.
+    pub fn run(&self, inputs: &[Tensor], shape: &[usize], own: &mut [f32], out: &mut [f32]) {
         let Some(first) = inputs.first() else { return };
         let pictures = Size::of(first.shape).zip(Size::of(shape));
         match (self, pictures) {
-            (Operator::Convolution(c), Some((from, to))) => c.run(first.values, from, to, out),
+            (Operator::Convolution(c), Some((from, to))) => c.run(first.values, from, to, own, out),
             (Operator::Depthwise(c), Some((from, to))) => c.run(first.values, from, to, out),
             (Operator::Transposed(c), Some((from, to))) => c.run(first.values, from, to, out),
             (Operator::Pad { before, value }, Some((from, to))) => {
@@ -100,11 +102,44 @@ impl Operator {
             (Operator::LeakyRelu(slope), _) => each(first.values, out, |x| x.max(slope * x)),
             (Operator::Slice { along, start }, _) => slice(*first, shape, *along, *start, out),
             (Operator::Transpose(order), _) => transpose(*first, shape, order, out),
-            (Operator::HardSwish, _) => {
-                each(first.values, out, |x| x * (x + 3.0).clamp(0.0, 6.0) / 6.0)
-            }
+            (Operator::HardSwish, _) => each(first.values, out, hard_swish),
             // Rejected when the network was read.
             (_, None) => {}
+        }
+    }
+
+    /// The number of elements that it needs while it runs, beside inputs and output.
+    pub fn memory(&self, input: &[usize], output: &[usize]) -> usize {
+        match (self, Size::of(input).zip(Size::of(output))) {
+            (Operator::Convolution(c), Some((from, to))) => c.memory(from, to),
+            _ => 0,
+        }
+    }
+
+    /// True if [`Operator::run_within`] can replace its input by its output, number by number.
+    pub fn works_within(&self) -> bool {
+        use Operator::{Add, HardSwish, LeakyRelu, Multiply, Relu, Reshape, Sigmoid};
+        matches!(self, Add(_) | Multiply(_) | Reshape | Sigmoid | Relu | LeakyRelu(_) | HardSwish)
+    }
+
+    /// Replaces an input, the longer one, by the output; gives the same as [`Operator::run`].
+    pub fn run_within(&self, other: Option<Tensor>, values: &mut [f32]) {
+        let other = other.map_or(&[][..], |t| t.values);
+        match self {
+            Operator::Add(clip) => {
+                combine_within(values, other, |a, b| a + b);
+                clip.apply(values);
+            }
+            Operator::Multiply(clip) => {
+                combine_within(values, other, |a, b| a * b);
+                clip.apply(values);
+            }
+            Operator::Sigmoid => values.iter_mut().for_each(|v| *v = sigmoid(*v)),
+            Operator::Relu => values.iter_mut().for_each(|v| *v = v.max(0.0)),
+            Operator::LeakyRelu(slope) => values.iter_mut().for_each(|v| *v = v.max(slope * *v)),
+            Operator::HardSwish => values.iter_mut().for_each(|v| *v = hard_swish(*v)),
+            // The same numbers.
+            _ => {}
         }
     }
 
@@ -136,6 +171,17 @@ fn combine(inputs: &[Tensor], out: &mut [f32], f: impl Fn(f32, f32) -> f32) {
     {
         out.iter_mut().zip(long.iter().zip(short.values)).for_each(|(o, (x, y))| *o = f(*x, *y));
     }
+}
+
+/// The same in the place of the longer one.
+fn combine_within(long: &mut [f32], short: &[f32], f: impl Fn(f32, f32) -> f32) {
+    for long in long.chunks_mut(short.len().max(1)) {
+        long.iter_mut().zip(short).for_each(|(x, y)| *x = f(*x, *y));
+    }
+}
+
+fn hard_swish(x: f32) -> f32 {
+    x * (x + 3.0).clamp(0.0, 6.0) / 6.0
 }
 
 fn concatenate(inputs: &[Tensor], along: usize, out: &mut [f32]) {

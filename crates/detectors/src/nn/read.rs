@@ -5,17 +5,18 @@ use super::NetworkError;
 use super::assemble::{Entry, Rejection};
 use super::file::{File, format};
 use super::flatbuffer::Table;
+use super::fuse::fuse;
 use super::network::{Effort, Layer, Network};
 use super::schema::{code, field};
 use std::collections::{HashMap, HashSet};
 
-impl Network {
+impl<'a> Network<'a> {
     /// Reads the network in a `.tflite` file.
     ///
     /// # Errors
     /// If the file is not of the format, or the network has unsupported operators or is
     /// too large.
-    pub fn read(bytes: &[u8]) -> Result<Network, NetworkError> {
+    pub fn read(bytes: &'a [u8]) -> Result<Network<'a>, NetworkError> {
         let model = Table::root(bytes, *b"TFL3")?;
         let codes = model.tables(field::CODES)?;
         let graphs = model.tables(field::GRAPHS)?;
@@ -66,7 +67,9 @@ impl Network {
         if outputs.is_empty() || outputs.iter().any(|o| !filled.contains(o)) {
             return Err(format("an output is never computed"));
         }
-        Ok(effort.network(layers, file.shapes, constants, input, outputs))
+        let mut shapes = file.shapes;
+        let layers = fuse(layers, &mut shapes, &constants, &outputs);
+        Ok(effort.network(layers, shapes, constants, input, outputs))
     }
 }
 

@@ -37,12 +37,12 @@ pub(super) fn decode(grids: &[[&[f32]; 2]; 3], placed: &Placed, least: f64) -> V
 fn within(cell: usize, stride: usize, sides: &[f32], placed: &Placed) -> Option<[f64; 4]> {
     let row = SIDE / stride;
     let centre = [cell % row, cell / row].map(|i| (i as f64 + 0.5) * stride as f64 - 0.5);
-    let mut bounds = [0.0; 4];
+    let (mut bounds, scale) = ([0.0; 4], placed.scale());
     for (k, (bound, bins)) in bounds.iter_mut().zip(sides.chunks_exact(BINS)).enumerate() {
         let distance = expectation(bins) * stride as f64;
         let at = centre[k % 2] + if k < 2 { -distance } else { distance };
         let c = k % 2;
-        *bound = ((at - placed.origin[c] as f64) / placed.scale[c]).clamp(0.0, placed.size[c]);
+        *bound = ((at - placed.origin[c] as f64) / scale[c]).clamp(0.0, placed.size[c]);
     }
     if placed.mirrored {
         (bounds[0], bounds[2]) = (placed.size[0] - bounds[2], placed.size[0] - bounds[0]);

@@ -14,9 +14,10 @@ mod tests;
 
 pub use classes::CLASSES;
 
-use crate::nn::{Network, NetworkError};
+use crate::nn::{Memory, Network, NetworkError};
 use pcadlang_numerics::platform::threads::map_side_by_side;
 use pcadlang_scene::vision::Photo;
+use std::sync::{Mutex, PoisonError};
 
 /// The side of the network's input, in samples.
 const SIDE: usize = 416;
@@ -88,7 +89,7 @@ impl FoundObject {
 /// The network that detects objects.
 #[derive(Debug)]
 pub struct ObjectFinder {
-    network: Network,
+    network: Network<'static>,
     /// For each stride, which outputs are the scores and the sides of boxes.
     outputs: [[usize; 2]; 3],
 }
@@ -99,7 +100,7 @@ impl ObjectFinder {
     ///
     /// # Errors
     /// If the files cannot be read, or contain a different network.
-    pub fn new(json: &[u8], weights: &[u8]) -> Result<ObjectFinder, NetworkError> {
+    pub fn new(json: &[u8], weights: &'static [u8]) -> Result<ObjectFinder, NetworkError> {
         let network = Network::read_graph_model(json, weights)?;
         let outputs = outputs(&network).filter(|_| network.input_shape() == [1, 3, SIDE, SIDE]);
         let outputs = outputs.ok_or_else(|| {
@@ -110,37 +111,45 @@ impl ObjectFinder {
 
     /// Returns the objects in a photograph, each once for each view that it is seen in, those with
     /// the highest scores first. The views are examined in parallel.
-    ///
-    /// # Errors
-    /// Errors of the network, which valid ones do not have.
     pub fn find_in_views(
         &self,
         photo: &Photo,
         views: &[View],
         options: &ObjectOptions,
-    ) -> Result<Vec<FoundObject>, NetworkError> {
-        let found = map_side_by_side(views, |view| self.find(photo, *view, options));
-        let mut all = found.into_iter().collect::<Result<Vec<_>, _>>()?.concat();
+    ) -> Vec<FoundObject> {
+        // A view takes what memory one before it left.
+        let left = Mutex::new(Vec::new());
+        let left = || left.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = map_side_by_side(views, |view| {
+            let mut memory = left().pop().unwrap_or_default();
+            let found = self.look(photo, *view, options, &mut memory);
+            left().push(memory);
+            found
+        });
+        let mut all = found.concat();
         all.sort_by(|a, b| b.score.total_cmp(&a.score));
-        Ok(all)
+        all
     }
 
     /// Returns the objects in a photograph, as seen in one view of it, those with the highest
     /// scores first.
-    ///
-    /// # Errors
-    /// Errors of the network, which valid ones do not have.
-    pub fn find(
+    pub fn find(&self, photo: &Photo, view: View, options: &ObjectOptions) -> Vec<FoundObject> {
+        self.look(photo, view, options, &mut Memory::default())
+    }
+
+    fn look(
         &self,
         photo: &Photo,
         view: View,
         options: &ObjectOptions,
-    ) -> Result<Vec<FoundObject>, NetworkError> {
-        let (input, placed) = sample::letterbox(photo, SIDE, view);
-        let outputs = self.network.run(input)?;
-        let grids = self.outputs.map(|pair| pair.map(|i| &outputs[i][..]));
+        memory: &mut Memory,
+    ) -> Vec<FoundObject> {
+        let placed = sample::place(photo, SIDE, view);
+        let fill = |input: &mut [f32]| sample::letterbox(photo, SIDE, &placed, input);
+        let outputs = self.network.run_in(memory, &[true; 6], fill);
+        let grids = self.outputs.map(|pair| pair.map(|i| outputs[i]));
         let found = boxes::decode(&grids, &placed, options.least);
-        Ok(boxes::best(found, options.most))
+        boxes::best(found, options.most)
     }
 }
 

@@ -19,7 +19,7 @@ fn decoded(outputs: &[[Vec<f32>; 2]; 3], least: f64) -> Vec<FoundObject> {
     let grids = [0, 1, 2].map(|k| [&outputs[k][0][..], &outputs[k][1][..]]);
     // Half a sample to a pixel across, a whole one down.
     let placed =
-        Placed { origin: [0; 2], scale: [0.5, 1.0], size: [700.0, 400.0], mirrored: false };
+        Placed { origin: [0; 2], samples: [350, 400], size: [700.0, 400.0], mirrored: false };
     decode(&grids, &placed, least)
 }
 
@@ -72,7 +72,7 @@ fn found(photo: &Photo) -> Vec<FoundObject> {
 }
 
 fn seen(photo: &Photo, view: View) -> Vec<FoundObject> {
-    networks::finder().unwrap().find(photo, view, &ObjectOptions::default()).unwrap()
+    networks::finder().unwrap().find(photo, view, &ObjectOptions::default())
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn nothing_is_found_where_there_is_nothing() {
 #[test]
 fn a_network_for_something_else_is_refused() {
     let (json, weights) = crate::nn::tests::graph::small().files();
-    let other = ObjectFinder::new(&json, &weights).unwrap_err().to_string();
+    let other = ObjectFinder::new(&json, weights.leak()).unwrap_err().to_string();
     assert!(other.contains("it is not a detector of objects"), "{other}");
     let swapped = ObjectFinder::new(pcadlang_nanodet::WEIGHTS, pcadlang_nanodet::MODEL);
     assert!(swapped.unwrap_err().to_string().contains("not a TensorFlow.js graph model"));

@@ -7,7 +7,7 @@ use super::landmarks::{self, View};
 use super::window::Window;
 use super::{FindOptions, PRESENT, PeopleFinder};
 use crate::boxes::overlap;
-use crate::nn::NetworkError;
+use crate::nn::Memory;
 use pcadlang_scene::vision::Photo;
 
 /// A box is looked at with this much around it, on each side, as a fraction of its longer side.
@@ -47,29 +47,27 @@ impl Area {
 
     /// Returns the runs of the networks that see a person there; in a box, those of whoever
     /// fills it.
-    ///
-    /// # Errors
-    /// Errors of the networks.
     pub fn runs(
         &self,
         finder: &PeopleFinder,
         photo: &Photo,
         mirrored: bool,
         options: &FindOptions,
-    ) -> Result<Vec<Run>, NetworkError> {
+        memory: &mut Memory,
+    ) -> Vec<Run> {
         let view = Window { mirrored, ..self.window };
-        let found = detect(&finder.detection, photo, &view, options.least)?;
+        let found = detect(&finder.detection, photo, &view, options.least, memory);
         let probable = |(i, d): &(usize, Detection)| *i < FIRST || d.score > PROBABLE;
         let found = found.into_iter().take(options.most).enumerate().filter(probable);
         let mut runs = Vec::new();
         for (_, d) in found {
-            if let Some(view) = twice(finder, photo, &d.window)? {
+            if let Some(view) = twice(finder, photo, &d.window, memory) {
                 runs.push(Run { score: d.score, in_box: None, found: d.window, view });
             }
         }
         let Some(person) = self.person else {
             runs.retain(|r| r.view.presence > PRESENT);
-            return Ok(runs);
+            return runs;
         };
         // The network of landmarks expects the hips in the middle: of a whole person, or else of
         // one whose upper half is seen.
@@ -77,7 +75,7 @@ impl Area {
         let upper = [left, top, right, 2.0 * bottom - top];
         for bounds in [person.bounds, upper] {
             let window = Window { mirrored, ..square(bounds, AROUND_ALL) };
-            let seen = twice(finder, photo, &window)?;
+            let seen = twice(finder, photo, &window, memory);
             runs.extend(seen.map(|view| Run {
                 score: 0.0,
                 in_box: None,
@@ -87,10 +85,10 @@ impl Area {
             let filling: Vec<Run> =
                 runs.drain(..).filter_map(|run| self.filling(run, person)).collect();
             if !filling.is_empty() {
-                return Ok(filling);
+                return filling;
             }
         }
-        Ok(runs)
+        runs
     }
 
     /// Returns a run as that of the person in a box, if that one fills it.
@@ -111,11 +109,11 @@ fn twice(
     finder: &PeopleFinder,
     photo: &Photo,
     window: &Window,
-) -> Result<Option<View>, NetworkError> {
-    match landmarks::run_landmarks(&finder.landmarks, photo, window)? {
-        Some(first) => landmarks::run_landmarks(&finder.landmarks, photo, &first.next),
-        None => Ok(None),
-    }
+    memory: &mut Memory,
+) -> Option<View> {
+    let network = &finder.landmarks;
+    let first = landmarks::run_landmarks(network, photo, window, false, memory)?;
+    landmarks::run_landmarks(network, photo, &first.next, true, memory)
 }
 
 /// An upright window about the middle of a box, its side a multiple of the box's longer side.

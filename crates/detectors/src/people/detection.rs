@@ -3,7 +3,7 @@
 
 use super::window::{Beyond, Window};
 use crate::boxes::overlap;
-use crate::nn::{Network, NetworkError, sigmoid};
+use crate::nn::{Memory, Network, NetworkError, sigmoid};
 use pcadlang_scene::vision::Photo;
 
 /// Side of the network's input, in samples.
@@ -71,9 +71,11 @@ pub(super) fn detect(
     photo: &Photo,
     view: &Window,
     least: f64,
-) -> Result<Vec<Detection>, NetworkError> {
-    let outputs = network.run(view.sample(photo, SIDE, [-1.0, 1.0], Beyond::Black))?;
-    let [boxes, scores] = &outputs[..] else { return Ok(Vec::new()) };
+    memory: &mut Memory,
+) -> Vec<Detection> {
+    let fill = |input: &mut [f32]| view.sample(photo, SIDE, [-1.0, 1.0], Beyond::Black, input);
+    let outputs = network.run_in(memory, &[true, true], fill);
+    let [boxes, scores] = outputs[..] else { return Vec::new() };
     let mut all: Vec<Candidate> = Vec::new();
     for ((anchor, numbers), score) in anchors().zip(boxes.chunks_exact(NUMBERS)).zip(scores) {
         let score = f64::from(sigmoid(score.clamp(-100.0, 100.0)));
@@ -89,7 +91,7 @@ pub(super) fn detect(
         }
     }
     all.sort_by(|a, b| b.score.total_cmp(&a.score));
-    Ok(people(all).into_iter().filter_map(|c| found(&c, view)).collect())
+    people(all).into_iter().filter_map(|c| found(&c, view)).collect()
 }
 
 fn found(c: &Candidate, view: &Window) -> Option<Detection> {

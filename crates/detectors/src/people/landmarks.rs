@@ -3,7 +3,7 @@
 
 use super::window::{Beyond, Window};
 use crate::boxes::around;
-use crate::nn::{Network, NetworkError, sigmoid};
+use crate::nn::{Memory, Network, NetworkError, sigmoid};
 use pcadlang_scene::vision::Photo;
 use pcadlang_scene::vision::keypoints::MEDIAPIPE;
 
@@ -74,15 +74,18 @@ fn other_side(i: usize) -> usize {
     }
 }
 
-/// Runs the network on a window of a picture; `None` if the output is not finite or
-/// suggests an unusable window.
+/// Runs the network on a window of a picture, with its mask or without (empty then); `None` if
+/// the output is not finite or suggests an unusable window.
 pub(super) fn run_landmarks(
     network: &Network,
     photo: &Photo,
     window: &Window,
-) -> Result<Option<View>, NetworkError> {
-    let outputs = network.run(window.sample(photo, SIDE, [0.0, 1.0], Beyond::Edge))?;
-    let [points, presence, mask, maps, metres] = &outputs[..] else { return Ok(None) };
+    with_mask: bool,
+    memory: &mut Memory,
+) -> Option<View> {
+    let fill = |input: &mut [f32]| window.sample(photo, SIDE, [0.0, 1.0], Beyond::Edge, input);
+    let outputs = network.run_in(memory, &[true, true, with_mask, true, true], fill);
+    let [points, presence, mask, maps, metres] = outputs[..] else { return None };
     let (sin, cos) = libm::sincos(window.turn);
     let one = |k: usize| {
         let i = if window.mirrored { other_side(k) } else { k };
@@ -99,14 +102,13 @@ pub(super) fn run_landmarks(
     let numbers =
         landmarks.iter().flat_map(|l| l.at.iter().chain(&l.metres).chain([&l.visibility]));
     let sound = next.is_sound() && numbers.chain([&f64::from(presence[0])]).all(|x| x.is_finite());
-    let mask = mask.clone();
-    Ok(sound.then(|| View {
+    sound.then(|| View {
         window: *window,
         presence: f64::from(presence[0]),
         landmarks,
         next,
-        mask,
-    }))
+        mask: mask.to_vec(),
+    })
 }
 
 /// Returns a position, refined to the mean of the landmark's heat map around it if that

@@ -22,7 +22,7 @@ mod window;
 pub use person::{Hypothesis, Landmark, Person};
 
 use crate::boxes::{around, overlap};
-use crate::nn::{Network, NetworkError};
+use crate::nn::{Memory, Network, NetworkError};
 use crate::objects::{FoundObject, VIEWS, View as ObjectView};
 use area::Area;
 use consensus::{ONE, PersonBox, Run, by_person, consensus, prominence, same, seen, sure};
@@ -82,8 +82,8 @@ impl Default for FindOptions {
 /// The two networks that detect people.
 #[derive(Debug)]
 pub struct PeopleFinder {
-    detection: Network,
-    landmarks: Network,
+    detection: Network<'static>,
+    landmarks: Network<'static>,
 }
 
 impl PeopleFinder {
@@ -92,7 +92,10 @@ impl PeopleFinder {
     ///
     /// # Errors
     /// If a file cannot be read, or contains a different network.
-    pub fn new(detection: &[u8], landmarks: &[u8]) -> Result<PeopleFinder, NetworkError> {
+    pub fn new(
+        detection: &'static [u8],
+        landmarks: &'static [u8],
+    ) -> Result<PeopleFinder, NetworkError> {
         let finder = PeopleFinder {
             detection: Network::read(detection)?,
             landmarks: Network::read(landmarks)?,
@@ -104,16 +107,13 @@ impl PeopleFinder {
 
     /// Returns the people in a photograph, the most prominent first. `threads` views (0:
     /// the number of cores) are processed in parallel.
-    ///
-    /// # Errors
-    /// Errors of the networks, which valid ones do not have.
     pub fn find(
         &self,
         photo: &Photo,
         search: Search,
         options: &FindOptions,
         threads: usize,
-    ) -> Result<Vec<Person>, NetworkError> {
+    ) -> Vec<Person> {
         let longer = photo.width().max(photo.height());
         let small = (longer > LONGEST).then(|| photo.shrunk(LONGEST));
         let looked_at = small.as_ref().unwrap_or(photo);
@@ -139,17 +139,20 @@ impl PeopleFinder {
             }
         };
         let views = areas.iter().flat_map(|area| [false, true].map(|mirrored| (area, mirrored)));
-        let mut looked: Vec<_> = views.map(|view| (view, Ok(Vec::new()))).collect();
+        let mut looked: Vec<_> = views.map(|view| (view, Vec::new())).collect();
         let threads =
             if threads == 0 { available_parallelism().map_or(1, usize::from) } else { threads };
-        let share = looked.len().div_ceil(threads).max(1);
-        side_by_side(looked.chunks_mut(share), |_, part| {
+        // A view and its mirror image, which take as long, go to different threads.
+        let mut parts: Vec<Vec<_>> = (0..threads.min(looked.len())).map(|_| Vec::new()).collect();
+        let count = parts.len().max(1);
+        looked.iter_mut().enumerate().for_each(|(i, view)| parts[i % count].push(view));
+        side_by_side(parts, |_, part| {
+            let mut memory = Memory::default();
             for ((area, mirrored), runs) in part {
-                *runs = area.runs(self, looked_at, *mirrored, options);
+                *runs = area.runs(self, looked_at, *mirrored, options, &mut memory);
             }
         });
-        let runs: Vec<Run> =
-            looked.into_iter().map(|(_, runs)| runs).collect::<Result<Vec<_>, _>>()?.concat();
+        let runs: Vec<Run> = looked.into_iter().flat_map(|(_, runs)| runs).collect();
         let each = by_person(runs, [size.0, size.1].map(f64::from)).into_iter();
         let mut people: Vec<Person> = each.filter_map(|runs| person(&runs, size, scale)).collect();
         people.sort_by(|a, b| b.sure.total_cmp(&a.sure));
@@ -165,7 +168,7 @@ impl PeopleFinder {
             }
         }
         all.sort_by(|a, b| b.score.total_cmp(&a.score));
-        Ok(all)
+        all
     }
 }
 

@@ -70,7 +70,7 @@ impl Window {
         all.iter().all(|x| x.is_finite()) && (1e-3..1e7).contains(&self.side)
     }
 
-    /// Returns `n` x `n` samples of the picture, with red, green and blue from `lo`
+    /// Fills `out` with `n` x `n` samples of the picture, with red, green and blue from `lo`
     /// (black) to `hi`. Samples are interpolated linearly; sample (i, j) is at (i / n, j
     /// / n), as in MediaPipe.
     pub(super) fn sample(
@@ -79,7 +79,8 @@ impl Window {
         n: usize,
         [lo, hi]: [f32; 2],
         beyond: Beyond,
-    ) -> Vec<f32> {
+        out: &mut [f32],
+    ) {
         let rgb = photo.rgb();
         let (width, height) = (i64::from(rgb.width()), i64::from(rgb.height()));
         let at = |x: i64, y: i64| -> [f32; 3] {
@@ -91,12 +92,12 @@ impl Window {
             rgb.get_pixel(x, y).0.map(f32::from)
         };
         let scale = (hi - lo) / 255.0;
-        let mut out = Vec::with_capacity(3 * n * n);
+        let mut samples = out.as_chunks_mut::<3>().0.iter_mut();
         // Positions are linear in the sample's row and column.
         let (start, right, down) =
             (self.pixel([0.0, 0.0]), self.pixel([1.0, 0.0]), self.pixel([0.0, 1.0]));
         for j in 0..n {
-            for i in 0..n {
+            for (i, sample) in samples.by_ref().take(n).enumerate() {
                 let (u, v) = (i as f64 / n as f64, j as f64 / n as f64);
                 let [x, y] =
                     [0, 1].map(|k| start[k] + u * (right[k] - start[k]) + v * (down[k] - start[k]));
@@ -105,12 +106,11 @@ impl Window {
                 let (left, top) = (left as i64, top as i64);
                 let (a, b) = (at(left, top), at(left + 1, top));
                 let (c, d) = (at(left, top + 1), at(left + 1, top + 1));
-                out.extend((0..3).map(|k| {
+                for (k, s) in sample.iter_mut().enumerate() {
                     let (ab, cd) = (a[k] * (1.0 - fx) + b[k] * fx, c[k] * (1.0 - fx) + d[k] * fx);
-                    lo + scale * (ab * (1.0 - fy) + cd * fy)
-                }));
+                    *s = lo + scale * (ab * (1.0 - fy) + cd * fy);
+                }
             }
         }
-        out
     }
 }

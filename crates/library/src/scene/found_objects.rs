@@ -51,7 +51,7 @@ pub(super) fn found(image: &ImageValue, views: &[View]) -> Result<Arc<Vec<FoundO
         let fault = |why: String| Fault::new(FaultKind::Other, format!("scene.objects: {why}"));
         let options = ObjectOptions { least: LEAST, most: usize::MAX };
         let finder = networks::finder().map_err(fault)?;
-        finder.find_in_views(photo, views, &options).map_err(|e| fault(e.to_string()))
+        Ok(finder.find_in_views(photo, views, &options))
     })
 }
 

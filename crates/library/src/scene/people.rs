@@ -106,7 +106,7 @@ impl ImageValue {
             let finder = networks::finder().map_err(fault)?;
             let search = key.within.map_or(Search::Everywhere(&objects), Search::Within);
             let found = finder.find(photo, search, &options, 0);
-            let found = found.map_err(|e| fault(e.to_string()))?;
+            drop(finder);
             found.into_iter().map(|p| Ok((p.clone(), value(&p, photo).map_err(fault)?))).collect()
         })
     }

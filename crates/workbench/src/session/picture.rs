@@ -49,8 +49,15 @@ impl ViewPicture {
 /// there is one. The picture has the given size, enlarged by [`pictures::picture_size`].
 pub fn over(view: &Arc<View>, photo: Option<&RgbImage>, (width, height): (u32, u32)) -> RgbImage {
     let large = pictures::picture_size(width, height);
-    let (contours, picture) = (view.contours(width.max(height)), view.frame(large.0.max(large.1)));
+    let contours = view.contours(width.max(height));
+    let side = large.0.max(large.1);
+    let picture = match side == width.max(height) {
+        true => view.frame(side),
+        // Of a view apart, so that the larger picture is not kept.
+        false => View::new(view.solid().clone(), *view.camera()).frame(side),
+    };
     let mut out = pictures::overlay(photo, &picture, &contours.slice());
+    drop(picture);
     let marked = ViewValue(Arc::clone(view));
     let points: Vec<[f64; 2]> = marked.landmarks(width, height).filter_map(|(_, at)| at).collect();
     pictures::dots(&mut out, (width, height), &points, pictures::OF_SCENE);

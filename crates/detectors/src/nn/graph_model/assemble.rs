@@ -12,6 +12,7 @@ use super::super::network::{Effort, Layer, MOST_NUMBERS};
 use super::super::operator::Operator;
 use super::super::resampling::Alignment;
 use super::super::shape::{Clip, Size, Window};
+use super::super::weights::Weights;
 use super::constants::Constant;
 use super::file::Node;
 use std::collections::HashMap;
@@ -44,15 +45,15 @@ impl View {
 /// A node's output.
 #[derive(Clone, Debug)]
 pub(super) enum Value<'a> {
-    Floats(&'a Constant<'a>),
+    Floats(Constant<'a>),
     Integers(Arc<[i32]>),
     Tensor(View),
 }
 
 /// The network so far.
 #[derive(Default)]
-pub(super) struct Assembly {
-    pub layers: Vec<Layer>,
+pub(super) struct Assembly<'a> {
+    pub layers: Vec<Layer<'a>>,
     pub shapes: Vec<Vec<usize>>,
     pub constants: HashMap<usize, Vec<f32>>,
     pub input: Option<usize>,
@@ -93,13 +94,13 @@ fn sizes(values: &[i32], least: i32) -> Checked<Vec<usize>> {
     all.collect::<Option<_>>().ok_or_else(|| "a size is out of range".into())
 }
 
-impl Assembly {
+impl<'a> Assembly<'a> {
     /// Adds a node; returns its outputs.
-    pub fn node<'a>(
+    pub fn node(
         &mut self,
         node: &Node,
         inputs: &[&Value<'a>],
-        constants: &'a HashMap<String, Constant<'a>>,
+        constants: &HashMap<String, Constant<'a>>,
     ) -> Checked<Vec<Value<'a>>> {
         let view = match &*node.op {
             "Const" => {
@@ -184,7 +185,7 @@ impl Assembly {
     /// Adds an operator with an output of this shape.
     fn put(
         &mut self,
-        operator: Operator,
+        operator: Operator<'a>,
         inputs: Vec<usize>,
         shape: Vec<usize>,
     ) -> Result<View, NetworkError> {
@@ -208,7 +209,7 @@ impl Assembly {
     /// Returns the floats of a constant.
     fn floats(&mut self, c: &Constant) -> Checked<Vec<f32>> {
         self.count(c.len())?;
-        let values = c.floats().ok_or("an input is of integers")?;
+        let values = c.floats().ok_or("an input is of integers")?.all();
         if values.iter().any(|v| v.is_nan()) {
             return Err("a constant is not a number".into());
         }
@@ -235,7 +236,7 @@ impl Assembly {
         self.plain(&view.ordered(&places))
     }
 
-    fn each(&mut self, operator: Operator, x: &View) -> Checked<View> {
+    fn each(&mut self, operator: Operator<'a>, x: &View) -> Checked<View> {
         let shape = self.shapes[x.tensor].clone();
         let made = self.put(operator, vec![x.tensor], shape)?;
         Ok(View { order: x.order.clone(), ..made })
@@ -283,7 +284,7 @@ impl Assembly {
         Ok(View { order: x.order.clone(), ..sum })
     }
 
-    fn split<'a>(&mut self, inputs: &[&Value]) -> Checked<Vec<Value<'a>>> {
+    fn split(&mut self, inputs: &[&Value]) -> Checked<Vec<Value<'a>>> {
         let x = tensor(inputs, 0)?;
         let parts = sizes(integers(inputs, 1)?, 1)?;
         let along = x.order[dimension(integers(inputs, 2)?, x.order.len())?];
@@ -366,7 +367,7 @@ impl Assembly {
         Ok(View { order: x.order.clone(), ..made })
     }
 
-    fn convolution(&mut self, node: &Node, inputs: &[&Value]) -> Checked<View> {
+    fn convolution(&mut self, node: &Node, inputs: &[&Value<'a>]) -> Checked<View> {
         let (x, from) = self.image(node, tensor(inputs, 0)?)?;
         let Some(Value::Floats(weights)) = inputs.get(1) else {
             return Err("its weights are not constants".into());
@@ -380,14 +381,14 @@ impl Assembly {
         let window = window(node, [height, width])?;
         fits(inner == from.channels && channels > 0)?;
         let to = window.output(from, channels);
-        self.count(Convolution::stored(weights.len(), channels))?;
-        // Output channels first.
-        let (stored, depth) = (self.floats(weights)?, height * width * inner);
-        let mut by_channel = vec![0.0; stored.len()];
-        for (k, line) in stored.chunks_exact(channels).enumerate() {
-            line.iter().enumerate().for_each(|(o, w)| by_channel[o * depth + k] = *w);
+        self.count(weights.len())?;
+        let (numbers, depth) =
+            (weights.floats().ok_or("an input is of integers")?, height * width * inner);
+        if !numbers.are_finite() {
+            return Err("a weight is not finite".into());
         }
-        let convolution = Convolution::new(window, &by_channel, &vec![0.0; channels], Clip::NONE);
+        let (weights, biases) = ((Weights::ByInput(numbers), depth), vec![0.0; channels]);
+        let convolution = Convolution::new(window, weights, &biases, Clip::NONE);
         self.put_image(node, Operator::Convolution(convolution), x, to)
     }
 
@@ -406,7 +407,7 @@ impl Assembly {
     fn put_image(
         &mut self,
         node: &Node,
-        operator: Operator,
+        operator: Operator<'a>,
         x: usize,
         to: Option<Size>,
     ) -> Checked<View> {
@@ -445,15 +446,17 @@ fn window(node: &Node, size: [usize; 2]) -> Checked<Window> {
         "VALID" => false,
         _ => return Err("unknown padding".into()),
     };
-    Ok(Window { size, stride, same })
+    Ok(Window { size, stride, same, shift: [0, 0] })
 }
 
 /// Returns a constant: integers are read, floats only where they are used.
-fn constant<'a>(stored: &'a Constant<'a>) -> Checked<Value<'a>> {
+fn constant<'a>(stored: &Constant<'a>) -> Checked<Value<'a>> {
     if stored.len() > MOST_INTEGERS {
-        return Ok(Value::Floats(stored));
+        return Ok(Value::Floats(stored.clone()));
     }
-    Ok(stored.integers().map_or(Value::Floats(stored), |all| Value::Integers(all.into())))
+    Ok(stored
+        .integers()
+        .map_or_else(|| Value::Floats(stored.clone()), |all| Value::Integers(all.into())))
 }
 
 /// Returns a list that has these values at these indices, and a default elsewhere.

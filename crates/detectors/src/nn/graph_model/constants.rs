@@ -3,25 +3,18 @@
 use super::super::NetworkError;
 use super::super::file::format;
 use super::super::network::MOST_NUMBERS;
+use super::super::weights::{Kind, Numbers};
 use super::file::Group;
-use half::slice::HalfFloatSliceExt;
 use std::collections::HashMap;
 
 type Result<T> = core::result::Result<T, NetworkError>;
 
-/// How a number is stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Half,
-    Float,
-    Integer,
-}
-
 /// A constant, as stored.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Constant<'a> {
     pub shape: Vec<usize>,
-    kind: Kind,
+    /// `None` if it is of integers.
+    kind: Option<Kind>,
     bytes: &'a [u8],
 }
 
@@ -35,9 +28,9 @@ pub(super) fn read<'a>(
     for w in manifest.into_iter().flat_map(|g| g.weights) {
         let stored = w.quantization.as_ref().map_or(&*w.dtype, |q| &*q.dtype);
         let (kind, width) = match (&*w.dtype, stored) {
-            ("float32", "float32") => (Kind::Float, 4),
-            ("float32", "float16") => (Kind::Half, 2),
-            ("int32", "int32") => (Kind::Integer, 4),
+            ("float32", "float32") => (Some(Kind::Float), 4),
+            ("float32", "float16") => (Some(Kind::Half), 2),
+            ("int32", "int32") => (None, 4),
             (kind, stored) => {
                 let (name, what) = (&w.name, "32- or 16-bit floats or 32-bit integers");
                 let why = format!("the constant {name} is not of {what}: {kind} as {stored}");
@@ -65,28 +58,19 @@ pub(super) fn read<'a>(
     Ok(all)
 }
 
-impl Constant<'_> {
+impl<'a> Constant<'a> {
     pub fn len(&self) -> usize {
-        self.bytes.len() / if self.kind == Kind::Half { 2 } else { 4 }
+        self.bytes.len() / if self.kind == Some(Kind::Half) { 2 } else { 4 }
     }
 
     /// Returns its floats; `None` if it is of integers.
-    pub fn floats(&self) -> Option<Vec<f32>> {
-        let words = self.bytes.as_chunks::<4>().0.iter();
-        match self.kind {
-            Kind::Integer => None,
-            Kind::Float => Some(words.map(|b| f32::from_le_bytes(*b)).collect()),
-            Kind::Half => {
-                let halves = self.bytes.as_chunks::<2>().0.iter();
-                let halves: Vec<_> = halves.map(|b| half::f16::from_le_bytes(*b)).collect();
-                Some(halves.to_f32_vec())
-            }
-        }
+    pub fn floats(&self) -> Option<Numbers<'a>> {
+        self.kind.map(|kind| Numbers::new(kind, self.bytes))
     }
 
     /// Returns its integers; `None` if it is of floats.
     pub fn integers(&self) -> Option<Vec<i32>> {
         let words = self.bytes.as_chunks::<4>().0.iter();
-        (self.kind == Kind::Integer).then(|| words.map(|b| i32::from_le_bytes(*b)).collect())
+        self.kind.is_none().then(|| words.map(|b| i32::from_le_bytes(*b)).collect())
     }
 }

@@ -13,7 +13,7 @@ use super::network::Network;
 use assemble::{Assembly, Value};
 use file::Model;
 
-impl Network {
+impl<'a> Network<'a> {
     /// Reads the network of a TensorFlow.js graph model: the bytes of its `model.json`, and
     /// those of its files of weights, one after the other. Inputs and outputs have the
     /// model's dimensions, in the model's order; the outputs are those of its signature.
@@ -21,7 +21,7 @@ impl Network {
     /// # Errors
     /// If the files are not of the format or do not belong together, or the network has
     /// unsupported operators or is too large.
-    pub fn read_graph_model(json: &[u8], weights: &[u8]) -> Result<Network, NetworkError> {
+    pub fn read_graph_model(json: &[u8], weights: &'a [u8]) -> Result<Network<'a>, NetworkError> {
         let (graph, manifest) = Model::parse(json)?.graph()?;
         let constants = constants::read(manifest, weights)?;
         let mut assembly = Assembly::default();
@@ -49,8 +49,8 @@ impl Network {
             }
         }
         let input = assembly.input.ok_or_else(|| format("no output depends on an input"))?;
-        let layers = fuse(assembly.layers, &assembly.constants, &outputs);
-        let Assembly { effort, shapes, constants, .. } = assembly;
+        let Assembly { layers, effort, mut shapes, constants, .. } = assembly;
+        let layers = fuse(layers, &mut shapes, &constants, &outputs);
         if outputs.is_empty() {
             return Err(format("it has no output"));
         }

@@ -1,12 +1,12 @@
 //! Tests of graph models: against values computed by hand, and with errors in them.
 
 use super::graph::{Graph, sizes, small, split, text, window};
-use crate::nn::{Network, NetworkError};
+use crate::nn::{Memory, Network, NetworkError};
 use serde_json::json;
 
-fn read(graph: &Graph) -> Result<Network, NetworkError> {
+fn read(graph: &Graph) -> Result<Network<'static>, NetworkError> {
     let (json, weights) = graph.files();
-    Network::read_graph_model(&json, &weights)
+    Network::read_graph_model(&json, weights.leak())
 }
 
 fn run(graph: &Graph, input: &[f32]) -> Vec<Vec<f32>> {
@@ -79,6 +79,20 @@ fn tensors_stored_in_different_orders_are_combined() {
     let padded = padded.node("y", "Pad", &["f", "by"], json!({}));
     let expected = [0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 0.0, 10.0, 20.0, 30.0, 0.0];
     assert_eq!(run(&padded, &ROW), [expected]);
+}
+
+/// Outputs that are wanted are the same without the others, whatever was in the memory before.
+#[test]
+fn only_what_is_wanted_is_computed() {
+    let (network, input) = (read(&split()).unwrap(), [1.0, -2.0, 3.0, 4.0, 5.0, 6.0, -7.0, 8.0]);
+    let all = network.run(input.to_vec()).unwrap();
+    let mut memory = Memory::default();
+    for wanted in [[true, false], [false, true], [false, false], [true, true]] {
+        let got = network.run_in(&mut memory, &wanted, |place| place.copy_from_slice(&input));
+        for ((got, all), wanted) in got.iter().zip(&all).zip(wanted) {
+            assert_eq!(*got, if wanted { &all[..] } else { &[] });
+        }
+    }
 }
 
 #[test]

@@ -12,7 +12,8 @@ use writer::{Field, file, small};
 
 #[test]
 fn a_file_is_read_and_run() {
-    let network = Network::read(&file(b"TFL3", &small())).unwrap();
+    let bytes = file(b"TFL3", &small());
+    let network = Network::read(&bytes).unwrap();
     assert_eq!(network.input_shape(), [1, 1, 3, 1]);
     assert_eq!(network.output_shapes().collect::<Vec<_>>(), [[1, 1, 2, 1]]);
     // 3 - 2 * 1 + 0.5, and 1 - 2 * 4 + 0.5, which the ReLU clips to 0.

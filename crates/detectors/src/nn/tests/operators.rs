@@ -1,8 +1,11 @@
 //! Tests of operators against their definitions.
 
-use crate::nn::convolution::{Convolution, Depthwise, Transposed};
+use crate::nn::convolution::Convolution;
+use crate::nn::depthwise::Depthwise;
 use crate::nn::resampling::{Alignment, depth_to_space, mean, pad, pool, resize};
 use crate::nn::shape::{Clip, Size, Window};
+use crate::nn::transposed::Transposed;
+use crate::nn::weights::{Kind, Numbers, Sparse, Weights};
 use pcadlang_numerics::num::simd::portable;
 
 const FREE: Clip = Clip::NONE;
@@ -24,10 +27,18 @@ fn value(x: &[f32], s: Size, [row, column]: [isize; 2], channel: usize) -> f64 {
 }
 
 fn near(got: &[f32], expected: &[f64]) {
+    near_by(got, expected, 2e-5);
+}
+
+fn near_by(got: &[f32], expected: &[f64], by: f64) {
     assert_eq!(got.len(), expected.len());
     for (i, (g, e)) in got.iter().zip(expected).enumerate() {
-        assert!((f64::from(*g) - e).abs() < 2e-5 * (1.0 + e.abs()), "{i}: {g}, {e}");
+        assert!((f64::from(*g) - e).abs() < by * (1.0 + e.abs()), "{i}: {g}, {e}");
     }
+}
+
+fn le_bytes(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
 /// Windows of all kinds, over images whose sizes are not multiples of anything.
@@ -37,8 +48,11 @@ fn cases() -> Vec<(Window, Size)> {
         [([1, 1], [1, 1]), ([3, 3], [1, 1]), ([3, 3], [2, 2]), ([5, 2], [1, 3]), ([1, 1], [2, 2])]
     {
         for same in [true, false] {
-            for (height, width, channels) in [(5, 7, 3), (8, 6, 19), (6, 9, 1)] {
-                all.push((Window { size, stride, same }, Size { height, width, channels }));
+            for (height, width, channels) in
+                [(5, 7, 3), (8, 6, 19), (6, 9, 1), (7, 13, 24), (9, 6, 32)]
+            {
+                let window = Window { size, stride, same, shift: [0, 0] };
+                all.push((window, Size { height, width, channels }));
             }
         }
     }
@@ -56,6 +70,7 @@ fn before(w: &Window, from: Size, to: Size) -> [isize; 2] {
 
 #[test]
 fn convolutions() {
+    let mut tiled = 0;
     for (k, (w, from)) in cases().into_iter().enumerate() {
         for channels in [1, 16, 21] {
             let to = w.output(from, channels).unwrap();
@@ -64,10 +79,13 @@ fn convolutions() {
                 (numbers(from.len(), k as u32), numbers(channels * depth, 99 + k as u32));
             let biases = numbers(channels, 7);
             let clip = if channels == 21 { Clip { lo: 0.0, hi: 0.5 } } else { FREE };
-            let c = Convolution::new(w, &weights, &biases, clip);
+            let bytes = le_bytes(&weights);
+            let stored = Weights::ByOutput(Numbers::new(Kind::Float, &bytes));
+            let c = Convolution::new(w, (stored, depth), &biases, clip);
             let (mut out, mut plain) = (vec![9.0; to.len()], vec![9.0; to.len()]);
-            c.run(&x, from, to, &mut out);
-            portable(|| c.run(&x, from, to, &mut plain));
+            let mut own = vec![5.0; c.memory(from, to)];
+            c.run(&x, from, to, &mut own, &mut out);
+            portable(|| c.run(&x, from, to, &mut own, &mut plain));
             assert_eq!(out, plain, "the same bits with narrow instructions");
             let [top, left] = before(&w, from, to);
             let mut expected = Vec::new();
@@ -86,8 +104,67 @@ fn convolutions() {
                     expected.push(sum.max(f64::from(clip.lo)).min(f64::from(clip.hi)));
                 }
             }
-            near(&out, &expected);
+            // By tiles, sums of larger numbers are rounded.
+            near_by(&out, &expected, if c.is_tiled(from) { 2e-4 } else { 2e-5 });
+            tiled += usize::from(c.is_tiled(from));
         }
+    }
+    assert!(tiled > 0);
+}
+
+/// Weights of halves, in both orders and without those that are 0, give the same bits; and so do
+/// windows that are shifted as images that are padded.
+#[test]
+fn convolutions_whatever_the_form_of_weights_and_padding() {
+    let (from, depth) = (Size { height: 6, width: 7, channels: 37 }, 9 * 37);
+    for channels in [5, 8, 16, 21] {
+        let halves: Vec<half::f16> = numbers(channels * depth, 3)
+            .into_iter()
+            .enumerate()
+            .map(|(i, w)| half::f16::from_f32(if i % 3 == 0 { w } else { 0.0 }))
+            .collect();
+        let values: Vec<f32> = halves.iter().map(|h| h.to_f32()).collect();
+        let by_output: Vec<u8> = halves.iter().flat_map(|h| h.to_le_bytes()).collect();
+        let turned = (0..depth).flat_map(|k| (0..channels).map(move |o| o * depth + k));
+        let by_input: Vec<u8> = turned.flat_map(|i| halves[i].to_le_bytes()).collect();
+        let floats = le_bytes(&values);
+        let window = Window { size: [3, 3], stride: [2, 1], same: false, shift: [1, 2] };
+        let to = Size { height: 3, width: 9, channels };
+        let padded = Size { height: 7, width: 11, channels: 37 };
+        let (x, biases) = (numbers(from.len(), 1), numbers(channels, 2));
+        let mut around = vec![9.0; padded.len()];
+        pad(&x, from, padded, [1, 2, 0], 0.0, &mut around);
+        let run = |window: Window, weights: Weights, x: &[f32], from: Size| {
+            let c = Convolution::new(window, (weights, depth), &biases, FREE);
+            let mut out = vec![9.0; to.len()];
+            c.run(x, from, to, &mut vec![5.0; c.memory(from, to)], &mut out);
+            out
+        };
+        let plain = Weights::ByOutput(Numbers::new(Kind::Float, &floats));
+        let expected = run(Window { shift: [0, 0], ..window }, plain, &around, padded);
+        for weights in [
+            Weights::ByOutput(Numbers::new(Kind::Half, &by_output)),
+            Weights::ByInput(Numbers::new(Kind::Half, &by_input)),
+            Weights::Sparse(Sparse::new(&values, channels).unwrap()),
+        ] {
+            assert_eq!(run(window, weights, &x, from), expected, "{channels}");
+        }
+    }
+}
+
+#[test]
+fn every_finite_half_is_decoded_exactly() {
+    let all = (0..=u16::MAX).map(half::f16::from_bits).filter(|h| h.is_finite());
+    let bytes: Vec<u8> = all.clone().flat_map(half::f16::to_le_bytes).collect();
+    let numbers = Numbers::new(Kind::Half, &bytes);
+    assert!(numbers.are_finite());
+    let mut decoded = vec![[0.0; 8]; numbers.len() / 8];
+    let place = (0, numbers.len() / 8);
+    Weights::ByInput(numbers).panel(place, (0, 8), &mut decoded);
+    let bits = |x: f32| x.to_bits();
+    assert!(decoded.as_flattened().iter().copied().map(bits).eq(all.map(|h| bits(h.to_f32()))));
+    for endless in [0x7c00u16, 0xfc00, 0x7e01] {
+        assert!(!Numbers::new(Kind::Half, &endless.to_le_bytes()).are_finite());
     }
 }
 
@@ -130,7 +207,7 @@ fn depthwise_convolutions() {
 fn transposed_convolutions() {
     for (size, stride) in [([2, 2], [2, 2]), ([3, 3], [2, 2]), ([4, 3], [2, 1])] {
         let (from, channels) = (Size { height: 4, width: 5, channels: 3 }, 2);
-        let window = Window { size, stride, same: true };
+        let window = Window { size, stride, same: true, shift: [0, 0] };
         let taps = size[0] * size[1];
         let weights = numbers(channels * taps * from.channels, 11);
         let t = Transposed { window, weights: weights.clone(), biases: vec![0.0; channels] };
@@ -143,11 +220,13 @@ fn transposed_convolutions() {
         {
             back[(i * taps + tap) * channels + o] = weights[(o * taps + tap) * 3 + i];
         }
-        let c = Convolution::new(window, &back, &[0.0; 3], FREE);
+        let bytes = le_bytes(&back);
+        let stored = Weights::ByOutput(Numbers::new(Kind::Float, &bytes));
+        let c = Convolution::new(window, (stored, back.len() / 3), &[0.0; 3], FREE);
         let (x, y) = (numbers(from.len(), 1), numbers(to.len(), 2));
         let (mut up, mut down) = (vec![0.0; to.len()], vec![0.0; from.len()]);
         t.run(&x, from, to, &mut up);
-        c.run(&y, to, from, &mut down);
+        c.run(&y, to, from, &mut vec![5.0; c.memory(to, from)], &mut down);
         let product = |a: &[f32], b: &[f32]| {
             a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum::<f64>()
         };
@@ -196,7 +275,7 @@ fn pictures_of_other_sizes() {
     assert_eq!(out, [1.0, 2.0, 3.0, 4.0]);
 
     // The last window extends beyond the border: its mean is over the values inside.
-    let window = Window { size: [1, 2], stride: [1, 2], same: true };
+    let window = Window { size: [1, 2], stride: [1, 2], same: true, shift: [0, 0] };
     let (x, to) = ([1.0, -5.0, 7.0], window.output(row(3), 1).unwrap());
     let mut out = [0.0; 2];
     pool(&x, row(3), to, &window, false, &mut out);
