@@ -108,10 +108,12 @@ pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream
     }
     let coarse = with_surrogates(p);
     if !coarse.is_empty() {
-        let (k, y) = (REVERSIBLE[rng.index(REVERSIBLE.len())], &coarse[rng.index(coarse.len())]);
+        let (k, at) = (REVERSIBLE[rng.index(REVERSIBLE.len())], rng.index(coarse.len()));
+        let y = &coarse[at];
         all.push(Plan::of("delayed", format!("delayed({k}, @{y});")));
-        let z = &coarse[rng.index(coarse.len())];
-        all.push(Plan::of("delayed", format!("delayed({k}, @{y}, then = @{z});")));
+        if let Some(z) = coarse.get(at + 1) {
+            all.push(Plan::of("delayed", format!("delayed({k}, @{y}, then = @{z});")));
+        }
     }
     if let Some(own) = own(p, posterior, rng) {
         all.push(own);
