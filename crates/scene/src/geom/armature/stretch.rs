@@ -1,9 +1,9 @@
 //! Body proportions: bones lengthened or shortened at rest, with everything attached to
 //! them moved along.
 
-use super::{Armature, Influence, RestGradient, Rig};
+use super::{Armature, RestGradient, Rig};
 use crate::geom::{GeomError, outer};
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3};
 
 /// A stretch of a bone's surroundings about its head.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,14 +95,11 @@ impl Armature {
         out.tails = tails.map(|(j, g)| take(j, joints[j].tail, *g)).collect();
         let points = rig.keypoints().iter().zip(&by.keypoints);
         out.keypoints = points.map(|(k, g)| take(k.joint, k.rest, *g)).collect();
-        if !by.vertices.is_empty() {
-            let skin = self.skin();
-            let vertices = self.positions().iter().zip(&skin.influences).zip(&by.vertices);
-            let vertex = |((p, i), g): ((&Vec3, &Influence), &DVec3)| {
-                i.joints().map(|(j, w)| take(j, p.as_dvec3(), *g * w)).sum::<DVec3>()
-            };
-            out.vertices = vertices.map(vertex).collect();
-        }
+        let vertex = |(v, g): &(u32, DVec3)| {
+            let (p, i) = self.vertex(*v)?;
+            Some((*v, i.joints().map(|(j, w)| take(j, p, *g * w)).sum()))
+        };
+        out.vertices = by.vertices.iter().filter_map(vertex).collect();
         for j in (0..joints.len()).rev() {
             let g = by_new_head[j];
             match joints[j].parent {
