@@ -457,8 +457,11 @@ impl Likelihood for MaskOf {
         if !self.partial {
             return Some(by_silhouette(&self.view, self.size, &prepared.gains()));
         }
-        let gains = prepared.gains_coverage(&self.view.fractions(self.size));
-        let vertices = self.view.vjp_fractions(self.size, &gains);
+        let fractions = self.view.fractions(self.size);
+        let gain = |pixel: usize| {
+            fractions.get(pixel).map_or(0.0, |fraction| prepared.gain_coverage(pixel, *fraction))
+        };
+        let vertices = self.view.vjp_fractions(self.size, gain);
         Some(BySolid { landmarks: Vec::new(), vertices }.into_adjoint())
     }
 }

@@ -11,6 +11,7 @@ use super::morph::{Anchor, Morph};
 use super::whole::Whole;
 use crate::geom::{ByVertex, GeomError, Instance, Mesh, Normals, Topology, edges, outer};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
+use pcadlang_numerics::num::simd::vectorised;
 use std::ops::Range;
 use std::sync::{Arc, LazyLock};
 
@@ -288,32 +289,33 @@ impl Armature {
         }
         let skin = Arc::clone(&self.skin);
         let reshaped = self.reshaped(&heads, &tails, &points, move |positions| {
-            for (k, amount) in added {
-                skin.morphs[k].move_vertices(amount, positions);
-            }
+            let mut all = Vec::with_capacity(3 * positions.len());
+            positions.iter().for_each(|p| all.extend_from_slice(p.as_ref()));
+            vectorised(
+                #[inline(always)]
+                || added.iter().for_each(|(k, by)| skin.morphs[*k].move_vertices(*by, &mut all)),
+            );
+            let mut moved: Vec<Vec3> = all.as_chunks().0.iter().map(|p| Vec3::from(*p)).collect();
             if cloth != 0.0 {
                 let normals = &skin.rest.normals;
-                positions.iter_mut().zip(normals).for_each(|(p, n)| *p += *n * cloth as f32);
+                moved.iter_mut().zip(normals).for_each(|(p, n)| *p += *n * cloth as f32);
             }
+            moved
         });
         Ok(Armature { weights, ..reshaped })
     }
 
     /// Returns the body with the given offsets added to joints and keypoints at rest, and
-    /// the rest vertices changed by a function.
+    /// the vertices at rest that a function makes of its own.
     pub(super) fn reshaped(
         &self,
         heads: &[DVec3],
         tails: &[DVec3],
         points: &[DVec3],
-        change: impl FnOnce(&mut [Vec3]) + Send + 'static,
+        change: impl FnOnce(&[Vec3]) -> Vec<Vec3> + Send + 'static,
     ) -> Armature {
         let (before, skin) = (Arc::clone(&self.surface), Arc::clone(&self.skin));
-        let surface = move || {
-            let mut positions = before.positions.to_vec();
-            change(&mut positions);
-            Surface::of(positions, skin)
-        };
+        let surface = move || Surface::of(change(&before.positions), skin);
         Armature {
             rig: self.rig.moved(heads, tails, points),
             surface: Arc::new(LazyLock::new(Box::new(surface))),
@@ -331,7 +333,7 @@ impl Armature {
         };
         let points =
             self.skin.anchors.iter().zip(&by.keypoints).map(|(anchor, g)| m.at(*anchor).dot(*g));
-        let vertices = by.vertices.iter().filter_map(|(v, g)| along(&m.vertices, *v, *g));
+        let vertices = by.vertices.iter().filter_map(|(v, g)| Some(m.of(*v as usize)?.dot(*g)));
         Some(
             dot(&m.heads, &by.heads)
                 + dot(&m.tails, &by.tails)
@@ -344,7 +346,8 @@ impl Armature {
     /// [`Armature::clothed`].
     pub fn vjp_cloth(&self, by: &RestGradient) -> f64 {
         let normals = &self.skin.rest.normals;
-        by.vertices.iter().filter_map(|(v, g)| along(normals, *v, *g)).sum()
+        let along = |v: u32, g: DVec3| Some(normals.get(v as usize)?.as_dvec3().dot(g));
+        by.vertices.iter().filter_map(|(v, g)| along(*v, *g)).sum()
     }
 
     /// Pulls derivatives with respect to the vertices of a posed body's meshes back to the
@@ -439,18 +442,14 @@ impl Armature {
     }
 }
 
-/// Returns the derivative along the vector of a vertex; `None` if there is no such vertex.
-fn along(vectors: &[Vec3], v: u32, by: DVec3) -> Option<f64> {
-    Some(vectors.get(v as usize)?.as_dvec3().dot(by))
-}
-
 fn blend(
     joints: &[u16; MOST_WEIGHTS],
     weights: &[f32; MOST_WEIGHTS],
     transforms: &[Affine3A],
 ) -> Affine3A {
     let mut m = Affine3A { matrix3: Mat3A::ZERO, translation: Vec3A::ZERO };
-    for (j, w) in joints.iter().zip(weights).take_while(|(_, w)| **w > 0.0) {
+    // Those of weight 0 too: how many there are differs from vertex to vertex.
+    for (j, w) in joints.iter().zip(weights) {
         let t = &transforms[usize::from(*j)];
         m.matrix3 += t.matrix3 * *w;
         m.translation += t.translation * *w;

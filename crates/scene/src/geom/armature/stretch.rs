@@ -1,9 +1,9 @@
 //! Body proportions: bones lengthened or shortened at rest, with everything attached to
 //! them moved along.
 
-use super::{Armature, RestGradient, Rig};
+use super::{Armature, Influence, RestGradient, Rig};
 use crate::geom::{GeomError, outer};
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 /// A stretch of a bone's surroundings about its head.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,9 +52,8 @@ impl Armature {
             self.rig().keypoints().iter().map(|k| offset(k.joint, k.rest)).collect();
         let skin = self.skin();
         Ok(self.reshaped(&heads, &tails, &points, move |positions| {
-            for (p, i) in positions.iter_mut().zip(&skin.influences) {
-                *p = i.blend(&maps, p.as_dvec3()).as_vec3();
-            }
+            let blended = |(p, i): (&Vec3, &Influence)| i.blend(&maps, p.as_dvec3()).as_vec3();
+            positions.iter().zip(&skin.influences).map(blended).collect()
         }))
     }
 }

@@ -47,22 +47,22 @@ impl Armature {
                 &made
             }
         };
-        // For each joint, sums over everything attached to it: the derivatives (forces),
-        // and p x g (torques about the origin).
-        let (mut force, mut torque) = (vec![DVec3::ZERO; count], vec![DVec3::ZERO; count]);
-        let mut hang = |joint: usize, rest: DVec3, g: DVec3| {
-            let t = &transforms[joint];
-            force[joint] += g;
-            torque[joint] += t.transform_point3(rest).cross(g);
-            t.matrix3.transpose() * g
-        };
+        let back = |joint: usize, g: DVec3| transforms[joint].matrix3.transpose() * g;
         let points = rig.keypoints().iter().zip(by_keypoint);
-        let keypoints = points.map(|(k, g)| hang(k.joint, k.rest, *g)).collect();
+        let keypoints = points.map(|(k, g)| back(k.joint, *g)).collect();
         let vertex = |(v, g): &(u32, DVec3)| {
-            let (p, i) = self.vertex(*v)?;
-            Some((*v, i.joints().map(|(j, w)| hang(j, p, *g * w)).sum()))
+            Some((*v, self.vertex(*v)?.1.joints().map(|(j, w)| back(j, *g * w)).sum()))
         };
         let vertices = by_vertex.iter().filter_map(vertex).collect();
+        // For each joint, sums over everything attached to it: the derivatives (forces),
+        // and p x g (torques about the origin), p being linear in the point at rest.
+        let by_transform = self.transforms_gradient(by_vertex, by_keypoint);
+        let mut force: Vec<DVec3> = by_transform.iter().map(|by| by.translation).collect();
+        let about = |(t, by): (&DAffine3, &DAffine3)| {
+            let axes = (0..3).map(|k| t.matrix3.col(k).cross(by.matrix3.col(k)));
+            axes.sum::<DVec3>() + t.translation.cross(by.translation)
+        };
+        let mut torque: Vec<DVec3> = transforms.iter().zip(&by_transform).map(about).collect();
         let (mut turns, mut heads) = (vec![DVec3::ZERO; count], vec![DVec3::ZERO; count]);
         for j in (0..count).rev() {
             let joint = &rig.joints()[j];

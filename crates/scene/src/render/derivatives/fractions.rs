@@ -10,10 +10,15 @@ use crate::render::pixels::fractions::{COLUMNS, Crossing, Fractions, ROWS};
 use std::cell::RefCell;
 
 impl Fractions {
-    /// The derivatives of the sum of `gain` times the fraction of each pixel with respect to the
+    /// The derivatives of the sum of the fraction of each pixel times its `gain` with respect to the
     /// vertices at the outline, in world coordinates, by their numbers among those of the solid's
     /// meshes in turn. `None` without samples, or if the near plane cuts a mesh.
-    pub fn vjp(&self, solid: &Solid, camera: &Camera, gain: &[f64]) -> Option<ByVertex> {
+    pub fn vjp(
+        &self,
+        solid: &Solid,
+        camera: &Camera,
+        gain: impl Fn(usize) -> f64,
+    ) -> Option<ByVertex> {
         let outline = self.outline.as_ref()?;
         let width = camera.width as usize;
         PLACES.with_borrow_mut(|places| {
@@ -25,7 +30,7 @@ impl Fractions {
                     continue;
                 }
                 // What it gains by a pixel to the right.
-                let gain = gain.get(row / ROWS * width + column / COLUMNS).copied().unwrap_or(0.0);
+                let gain = gain(row / ROWS * width + column / COLUMNS);
                 let gain = if *enters { -gain } else { gain } / ROWS as f64;
                 let share = (row as f64 - edge.from[1]) / (edge.to[1] - edge.from[1]);
                 // Of x by y, in pixels.

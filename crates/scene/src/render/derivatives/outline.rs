@@ -28,12 +28,12 @@ impl View {
         })
     }
 
-    /// The same of the sum of `gain` times the fraction of each pixel that shows the solid,
-    /// [`View::fractions`], which is not a step function.
+    /// The same of the sum of the fraction of each pixel that shows the solid, [`View::fractions`],
+    /// times the pixel's `gain`. The sum is not a step function.
     /// It has the vertices at the outline.
-    pub fn vjp_fractions(&self, size: u32, gain: &[f64]) -> ByVertex {
+    pub fn vjp_fractions(&self, size: u32, gain: impl Fn(usize) -> f64) -> ByVertex {
         let camera = self.camera().scaled_to(size);
-        if let Some(by_vertex) = self.covered(size).vjp(self.solid(), &camera, gain) {
+        if let Some(by_vertex) = self.covered(size).vjp(self.solid(), &camera, &gain) {
             return by_vertex;
         }
         let by_vertex = self.vjp_outline(size, |picture, piece, length| {
@@ -41,7 +41,7 @@ impl View {
             // A piece may run through several pixels.
             let part = |k: i32| {
                 let along = f64::from(length) * f64::from(2 * k + 1 - PARTS) / f64::from(2 * PARTS);
-                picture.at(gain, x + along * tx, y + along * ty)
+                gain(picture.at(x + along * tx, y + along * ty))
             };
             (0..PARTS).map(part).sum::<f64>() / f64::from(PARTS)
         });
@@ -96,11 +96,11 @@ impl DepthImage<'_> {
         }
     }
 
-    /// The value of the pixel at a position.
-    fn at(&self, values: &[f64], x: f64, y: f64) -> f64 {
+    /// The pixel at a position, or the nearest one.
+    fn at(&self, x: f64, y: f64) -> usize {
         let (w, h) = (self.width as usize, self.height as usize);
         let (i, j) = ((x.max(0.0) as usize).min(w - 1), (y.max(0.0) as usize).min(h - 1));
-        values.get(j * w + i).copied().unwrap_or(0.0)
+        j * w + i
     }
 
     /// The value interpolated bilinearly between pixel centres.
@@ -230,7 +230,7 @@ mod tests {
             // The outline moves by about 0.03 pixels: 8 steps of the fractions.
             let vjp = |view: &View| {
                 let mut all = vec![DVec3::ZERO; view.solid().vertex_count()];
-                let some = view.vjp_fractions(SIZE, &gain);
+                let some = view.vjp_fractions(SIZE, |pixel| gain[pixel]);
                 some.into_iter().for_each(|(v, by)| all[v as usize] += by);
                 all
             };

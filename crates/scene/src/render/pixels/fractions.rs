@@ -167,6 +167,10 @@ struct RowLists {
     /// Where each row's crossings begin among all of them.
     begins: Vec<u32>,
     all: Vec<u64>,
+    /// For a row of pixels, the covered samples of each less those of the one before it.
+    steps: Vec<i32>,
+    /// The fraction of each pixel.
+    values: Vec<f32>,
 }
 
 /// A side from its upper to its lower end, in samples: whole numbers are their places.
@@ -338,7 +342,7 @@ impl Samples {
 
     /// Puts in order what is crossed in each row.
     #[inline(always)]
-    fn sort(&self, RowLists { begins, all }: &mut RowLists) {
+    fn sort(&self, RowLists { begins, all, .. }: &mut RowLists) {
         // How many more are crossed in a row than in the one before it, then the sums.
         begins.clear();
         begins.resize(self.rows + 2, 0);
@@ -386,63 +390,66 @@ impl Samples {
 
     /// The fraction of each pixel, and where covered samples begin and end.
     fn count(&self, lists: &mut RowLists) -> (Arc<[f32]>, Vec<Crossing>) {
-        let mut counts = vec![0u16; self.width * self.rows / ROWS];
         let mut crossings = Vec::with_capacity(4 * self.rows);
         vectorised(
             #[inline(always)]
             || {
                 self.sort(lists);
-                for row in 0..self.rows {
-                    let [begin, end] = [row, row + 1].map(|row| lists.begins[row] as usize);
-                    let pixels = row / ROWS * self.width..(row / ROWS + 1) * self.width;
-                    let list = &lists.all[begin..end];
-                    row_of(list, row as u32, &mut counts[pixels], &mut crossings);
+                let RowLists { begins, all, steps, values } = &mut *lists;
+                values.clear();
+                for pixels in 0..self.rows / ROWS {
+                    steps.clear();
+                    steps.resize(self.width + 2, 0);
+                    for row in pixels * ROWS..(pixels + 1) * ROWS {
+                        let [begin, end] = [row, row + 1].map(|row| begins[row] as usize);
+                        row_of(&all[begin..end], row as u32, steps, &mut crossings);
+                    }
+                    let mut count = 0;
+                    values.extend(steps[..self.width].iter().map(|step| {
+                        count += step;
+                        count as f32 / (COLUMNS * ROWS) as f32
+                    }));
                 }
             },
         );
-        let fraction = |count: u16| f32::from(count) / (COLUMNS * ROWS) as f32;
-        (counts.into_iter().map(fraction).collect(), crossings)
+        (lists.values.as_slice().into(), crossings)
     }
 }
 
-/// Counts the covered samples of a row by pixel, from what is crossed in it, in order.
+/// Follows a row of samples by what is crossed in it, in order, and adds to the covered samples of
+/// each pixel less those of the pixel before it.
 #[inline(always)]
-fn row_of(list: &[u64], row: u32, counts: &mut [u16], crossings: &mut Vec<Crossing>) {
-    let (mut faces, mut begin, mut rest) = (0, 0, list);
-    while let Some(next) = rest.first() {
-        let column = next >> (FACES_BITS + EDGE_BITS);
-        let before = faces;
-        let change = |key: &u64| (key & ((1 << FACES_BITS) - 1)) as i32 - NO_FACES;
-        let here = rest.iter().take_while(|key| *key >> (FACES_BITS + EDGE_BITS) == column);
-        faces += here.clone().map(change).sum::<i32>();
+fn row_of(list: &[u64], row: u32, steps: &mut [i32], crossings: &mut Vec<Crossing>) {
+    const COLUMN: u32 = FACES_BITS + EDGE_BITS;
+    let change = |key: u64| (key & ((1 << FACES_BITS) - 1)) as i32 - NO_FACES;
+    let mut step = |column: usize, by: i32| {
+        let within = (column % COLUMNS) as i32;
+        if let Some([here, next]) = steps.get_mut(column / COLUMNS..column / COLUMNS + 2) {
+            (*here, *next) = (*here + by * (COLUMNS as i32 - within), *next + by * within);
+        }
+    };
+    let (mut faces, mut at, mut begin) = (0, 0, 0);
+    while at < list.len() {
+        let (from, column, before) = (at, list[at] >> COLUMN, faces);
+        while at < list.len() && list[at] >> COLUMN == column {
+            faces += change(list[at]);
+            at += 1;
+        }
         let enters = faces > 0;
-        if enters != (before > 0) {
-            // Of those in one place, the first that goes the way of all.
-            let edge = here.clone().find(|key| (change(key) > 0) == enters).unwrap_or(next);
-            let edge = (edge >> FACES_BITS) as u32;
-            crossings.push(Crossing { row, column: column as u32, edge, enters });
-            match enters {
-                true => begin = column as usize,
-                false => add_between(counts, begin, column as usize),
-            }
+        if enters == (before > 0) {
+            continue;
         }
-        rest = &rest[here.count()..];
+        // Of those in one place, the first that goes the way of all.
+        let here = &list[from..at];
+        let edge = here.iter().find(|key| (change(**key) > 0) == enters).unwrap_or(&here[0]);
+        let edge = (edge >> FACES_BITS) as u32;
+        crossings.push(Crossing { row, column: column as u32, edge, enters });
+        begin = column as usize;
+        step(begin, if enters { 1 } else { -1 });
     }
-}
-
-/// Adds the samples between two columns to those of their pixels.
-#[inline(always)]
-fn add_between(counts: &mut [u16], begin: usize, end: usize) {
-    if begin >= end {
-        return;
-    }
-    let (from, to) = (begin / COLUMNS, (end - 1) / COLUMNS);
-    if let Some(counts) = counts.get_mut(from..=to) {
-        counts.iter_mut().for_each(|count| *count += COLUMNS as u16);
-        let within = [begin % COLUMNS, (to + 1) * COLUMNS - end];
-        for (at, less) in [0, to - from].into_iter().zip(within) {
-            counts[at] -= less as u16;
-        }
+    // What is not left covers nothing.
+    if faces > 0 {
+        step(begin, -1);
     }
 }
 
