@@ -226,7 +226,9 @@ pub fn adjoint_to_python<'py>(py: Python<'py>, by: &Derivatives) -> PyResult<Bou
             }
             out.into_any()
         }
-        Derivatives::Unknown => Bound::new(py, Adjoint(Derivatives::Unknown))?.into_any(),
+        Derivatives::Points(_) | Derivatives::Unknown => {
+            Bound::new(py, Adjoint(by.clone()))?.into_any()
+        }
     })
 }
 

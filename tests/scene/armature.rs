@@ -246,7 +246,8 @@ fn derivatives_of_posed_vertices_agree_with_differences() {
             .sum::<f64>();
         v.iter().zip(&by_vertex).map(|(v, g)| v.dot(*g)).sum::<f64>() + points
     };
-    let by_transform = body.transforms_gradient(&by_vertex, &by_keypoint);
+    let numbered: Vec<(u32, DVec3)> = (0..).zip(by_vertex.iter().copied()).collect();
+    let by_transform = body.transforms_gradient(&numbered, &by_keypoint);
     let gradient = body.rig().transforms_vjp(&pose, &rules, &by_transform).unwrap();
     for j in 0..pose.len() {
         for k in 0..3 {

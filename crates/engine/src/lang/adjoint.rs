@@ -16,6 +16,10 @@ pub enum Adjoint {
     /// parameters, in the order of its constructor. For an object or a likelihood: as its
     /// type defines.
     Array(Vec<f64>),
+    /// With respect to some of the points of a list, such as the vertices of a mesh: each the
+    /// number of a point and the derivatives with respect to its three coordinates. Those of a
+    /// point that is there several times add up.
+    Points(Vec<(u32, [f64; 3])>),
     /// With respect to the elements of an array.
     List(Vec<Adjoint>),
     /// With respect to some fields of a record.
@@ -83,6 +87,9 @@ impl Adjoint {
         match self {
             Adjoint::Num(g) => *g *= factor,
             Adjoint::Array(gs) => gs.iter_mut().for_each(|g| *g *= factor),
+            Adjoint::Points(all) => {
+                all.iter_mut().flat_map(|(_, g)| g).for_each(|g| *g *= factor);
+            }
             Adjoint::List(all) => all.iter_mut().for_each(|a| a.scale(factor)),
             Adjoint::Record(all) => all.iter_mut().for_each(|(_, a)| a.scale(factor)),
             Adjoint::Zero | Adjoint::Unknown => {}
@@ -96,6 +103,7 @@ impl Adjoint {
             (Adjoint::Zero, other) => *self = other,
             (Adjoint::Num(a), Adjoint::Num(b)) => *a += b,
             (Adjoint::Array(a), Adjoint::Array(b)) => accumulate(a, &b),
+            (Adjoint::Points(a), Adjoint::Points(b)) => a.extend(b),
             (Adjoint::Record(_), Adjoint::Record(fields)) => {
                 fields.into_iter().for_each(|(name, by)| self.add_field(&name, by));
             }
@@ -191,5 +199,20 @@ mod tests {
         let mut rows = Adjoint::Zero;
         rows.add_element(2, 1, Adjoint::Array(vec![5.0]));
         assert_eq!((rows.element(0), rows.element(1)), (Adjoint::Zero, Adjoint::Array(vec![5.0])));
+    }
+
+    #[test]
+    fn points_may_be_there_twice() {
+        let mut a = Adjoint::List(vec![Adjoint::Zero, Adjoint::Points(vec![(7, [1.0; 3])])]);
+        a.add(Adjoint::List(vec![
+            Adjoint::Array(vec![4.0]),
+            Adjoint::Points(vec![(2, [2.0; 3]), (7, [3.0; 3])]),
+        ]));
+        a.scale(2.0);
+        assert_eq!(a.element(0), Adjoint::Array(vec![8.0]));
+        assert_eq!(
+            a.element(1),
+            Adjoint::Points(vec![(7, [2.0; 3]), (2, [4.0; 3]), (7, [6.0; 3])])
+        );
     }
 }

@@ -1,37 +1,50 @@
 //! The adjoints of scene objects: derivatives with respect to landmarks and vertices, as
 //! points.
 //!
-//! They are passed as lists of arrays of numbers. A part on which nothing depends is
-//! zero, whatever its length, and costs nothing.
+//! They are passed as lists of arrays of numbers, and of points for vertices. A part on which
+//! nothing depends is zero, whatever its length, and costs nothing.
 
 use glam::DVec3;
 use pcadlang_engine::lang::adjoint::Adjoint;
 use pcadlang_engine::lang::value::Value;
-use pcadlang_scene::geom::Solid;
 use pcadlang_scene::geom::armature::{Armature, RestGradient};
+use pcadlang_scene::geom::{ByVertex, Solid};
 
-/// The adjoint of a solid, in the layout of [`super::SolidValue`]. An empty list stands
-/// for zeros.
+/// The adjoint of a solid, in the layout of [`super::SolidValue`]. An empty list of landmarks
+/// stands for zeros.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BySolid {
     /// With respect to each landmark.
     pub landmarks: Vec<DVec3>,
-    /// With respect to each vertex.
-    pub vertices: Vec<DVec3>,
+    /// With respect to vertices.
+    pub vertices: ByVertex,
 }
 
 impl BySolid {
     pub fn read(by: &Adjoint, solid: &Solid) -> BySolid {
-        let vertices = match part(by, 1) {
-            // Counting the vertices would build the meshes.
-            Adjoint::Zero => Vec::new(),
-            by => points(by, solid.vertex_count()),
-        };
-        BySolid { landmarks: points(part(by, 0), solid.landmarks().len()), vertices }
+        let landmarks = points(part(by, 0), solid.landmarks().len());
+        BySolid { landmarks, vertices: vertices(part(by, 1)) }
+    }
+
+    /// Of derivatives with respect to each vertex.
+    pub fn of_all(by_vertex: impl IntoIterator<Item = DVec3>) -> BySolid {
+        let vertices = (0..).zip(by_vertex).filter(|(_, by)| *by != DVec3::ZERO).collect();
+        BySolid { vertices, ..BySolid::default() }
+    }
+
+    /// Returns those with respect to each of a number of vertices.
+    pub fn each_vertex(&self, count: usize) -> Vec<DVec3> {
+        let mut all = vec![DVec3::ZERO; count];
+        for (v, by) in &self.vertices {
+            if let Some(place) = all.get_mut(*v as usize) {
+                *place += *by;
+            }
+        }
+        all
     }
 
     pub fn into_adjoint(self) -> Adjoint {
-        Adjoint::List(vec![from_points(&self.landmarks), from_points(&self.vertices)])
+        Adjoint::List(vec![from_points(&self.landmarks), from_vertices(&self.vertices)])
     }
 }
 
@@ -42,18 +55,15 @@ pub(super) fn by_armature(by: &Adjoint, body: &Armature) -> RestGradient {
         heads: points(part(by, 0), rig.joints().len()),
         tails: points(part(by, 1), rig.joints().len()),
         keypoints: points(part(by, 2), rig.keypoints().len()),
-        vertices: match part(by, 3) {
-            Adjoint::Zero => Vec::new(),
-            by => points(by, body.influences().len()),
-        },
+        vertices: vertices(part(by, 3)),
     }
 }
 
 /// The inverse of [`by_armature`].
 pub(super) fn armature_adjoint(by: &RestGradient) -> Adjoint {
-    Adjoint::List(
-        [&by.heads, &by.tails, &by.keypoints, &by.vertices].map(|p| from_points(p)).to_vec(),
-    )
+    let mut parts = [&by.heads, &by.tails, &by.keypoints].map(|p| from_points(p)).to_vec();
+    parts.push(from_vertices(&by.vertices));
+    Adjoint::List(parts)
 }
 
 fn part(by: &Adjoint, i: usize) -> &Adjoint {
@@ -63,8 +73,22 @@ fn part(by: &Adjoint, i: usize) -> &Adjoint {
     }
 }
 
+fn vertices(by: &Adjoint) -> ByVertex {
+    match by {
+        Adjoint::Points(all) => all.iter().map(|(v, by)| (*v, DVec3::from_array(*by))).collect(),
+        _ => ByVertex::new(),
+    }
+}
+
+fn from_vertices(by: &[(u32, DVec3)]) -> Adjoint {
+    match by {
+        [] => Adjoint::Zero,
+        by => Adjoint::Points(by.iter().map(|(v, by)| (*v, by.to_array())).collect()),
+    }
+}
+
 /// Converts an adjoint of `3 n` numbers to points.
-pub(super) fn points(by: &Adjoint, n: usize) -> Vec<DVec3> {
+fn points(by: &Adjoint, n: usize) -> Vec<DVec3> {
     match by {
         Adjoint::Array(gs) if gs.len() == 3 * n => {
             gs.chunks_exact(3).map(DVec3::from_slice).collect()

@@ -228,12 +228,12 @@ pub(super) fn by_view(by: Adjoint, others: usize) -> ArgAdjoints {
 
 /// The adjoint of the view, given derivatives with respect to the pieces of its contours.
 pub(crate) fn by_contours(view: &View, size: u32, by_piece: &[[f64; 4]]) -> Adjoint {
-    BySolid { landmarks: Vec::new(), vertices: view.vjp_contours(size, by_piece) }.into_adjoint()
+    BySolid::of_all(view.vjp_contours(size, by_piece)).into_adjoint()
 }
 
 /// The adjoint of the view, given derivatives with respect to the coverage of each pixel.
 pub(crate) fn by_silhouette(view: &View, size: u32, gains: &[f64]) -> Adjoint {
-    BySolid { landmarks: Vec::new(), vertices: view.vjp_mask(size, gains) }.into_adjoint()
+    BySolid::of_all(view.vjp_mask(size, gains)).into_adjoint()
 }
 
 /// Returns the observed image, if its aspect ratio matches that of the view's picture.
@@ -457,8 +457,11 @@ impl Likelihood for MaskOf {
         if !self.partial {
             return Some(by_silhouette(&self.view, self.size, &prepared.gains()));
         }
-        let gains = prepared.gains_coverage(&self.view.fractions(self.size));
-        let vertices = self.view.vjp_fractions(self.size, &gains);
+        let fractions = self.view.fractions(self.size);
+        let gain = |pixel: usize| {
+            fractions.get(pixel).map_or(0.0, |fraction| prepared.gain_coverage(pixel, *fraction))
+        };
+        let vertices = self.view.vjp_fractions(self.size, gain);
         Some(BySolid { landmarks: Vec::new(), vertices }.into_adjoint())
     }
 }
@@ -525,9 +528,9 @@ impl Likelihood for DepthOf {
     /// With respect to the view.
     fn gradient(&self, observed: &Value) -> Option<Adjoint> {
         let (prepared, frame) = self.prepared(observed).ok()?;
-        let mut vertices = self.view.vjp_depth(self.size, &prepared.slopes(&frame.depth));
+        let within = self.view.vjp_depth(self.size, &prepared.slopes(&frame.depth));
         let outline = self.view.vjp_mask(self.size, &prepared.gains(&frame.depth));
-        vertices.iter_mut().zip(outline).for_each(|(v, o)| *v += o);
-        Some(BySolid { landmarks: Vec::new(), vertices }.into_adjoint())
+        let both = within.iter().zip(outline).map(|(within, outline)| *within + outline);
+        Some(BySolid::of_all(both).into_adjoint())
     }
 }

@@ -13,8 +13,8 @@ use pcadlang_scene::vision::Lens;
 use std::any::Any;
 use std::sync::Arc;
 
-/// A solid. Its adjoint is a list of two arrays: the derivatives with respect to each
-/// landmark's x, y and z in turn, and to those of each vertex of its meshes, in world
+/// A solid. Its adjoint is a list of an array and points: the derivatives with respect to each
+/// landmark's x, y and z in turn, and to vertices, numbered through its meshes, in world
 /// coordinates.
 #[derive(Clone, Debug)]
 pub struct SolidValue(pub Solid, Remarks);
@@ -122,9 +122,9 @@ pub(super) fn affine_adjoint(linear: DMat3, shift: DVec3) -> Adjoint {
     Adjoint::Array(linear.to_cols_array().into_iter().chain(shift.to_array()).collect())
 }
 
-/// An armature: a rig with its mesh. Its adjoint is a list of four arrays: the
+/// An armature: a rig with its mesh. Its adjoint is a list of three arrays and points: the
 /// derivatives with respect to the rest positions of the joints' heads, their tails, the
-/// keypoints and the vertices.
+/// keypoints and vertices.
 #[derive(Clone, Debug)]
 pub struct ArmatureValue(pub Arc<Armature>, Remarks);
 

@@ -4,7 +4,7 @@
 //! each has one normal; edges know the faces on both sides across such splits. Meshes of
 //! one shape share their [`Topology`].
 
-use super::{Bounds, Normals, Patches, Seams, Sides};
+use super::{Bounds, Normals, Patches, Sides};
 use glam::Vec3;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -133,8 +133,6 @@ pub struct Topology {
     pub patches: Patches,
     /// The sides of the triangles.
     pub sides: Sides,
-    /// If it is a part of a surface: where its parts meet, and the number of this one.
-    pub seams: Option<(Arc<Seams>, usize)>,
 }
 
 /// A triangle mesh.

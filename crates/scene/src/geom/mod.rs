@@ -30,6 +30,7 @@ mod revolution;
 mod revolve;
 mod sides;
 mod solid;
+mod solid_vjps;
 mod sphere;
 pub mod stl;
 
@@ -51,9 +52,11 @@ pub use patches::Patches;
 pub(crate) use patches::Run;
 pub use profile_path::{Profile, Wall};
 pub use revolution::{Revolution, Rim, Ring, Span};
-pub use sides::{Seams, Sides};
+pub(crate) use sides::Side;
+pub use sides::Sides;
 pub(crate) use solid::MeshesMark;
-pub use solid::{Instance, PlacedGradient, PlacedRevolution, Solid};
+pub use solid::{Instance, PlacedRevolution, Solid};
+pub use solid_vjps::{ByVertex, PlacedGradient};
 pub use sphere::{sphere, vjp_sphere};
 
 /// Returns the matrix a b'.

@@ -9,8 +9,8 @@ use super::armature::PosedBody;
 use super::landmark::{Landmark, unique};
 use super::mesh::{MOST_PARTS, MOST_TRIANGLES};
 use super::revolution::Revolution;
-use super::{Affine, Bounds, Edge, Edges, GeomError, Mesh, NO_FACE, Topology, outer};
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use super::{Affine, Bounds, Edge, Edges, GeomError, Mesh, NO_FACE, Topology};
+use glam::{DAffine3, DVec3};
 use std::fmt;
 use std::ops::Deref;
 use std::sync::{Arc, LazyLock, Weak};
@@ -55,6 +55,8 @@ pub struct Solid {
     joints: Option<Arc<[DAffine3]>>,
     /// The bodies in it, as they are posed and placed.
     bodies: Option<Arc<[PosedBody]>>,
+    /// True if it is one of these, and nothing else.
+    is_body: bool,
 }
 
 /// A placed surface of revolution.
@@ -139,19 +141,6 @@ impl fmt::Debug for Solid {
     }
 }
 
-/// Derivatives with respect to the inputs of [`Solid::placed`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct PlacedGradient {
-    /// With respect to the placement's linear part.
-    pub linear: DMat3,
-    /// With respect to its translation.
-    pub shift: DVec3,
-    /// With respect to the vertices before placement.
-    pub vertices: Vec<DVec3>,
-    /// With respect to the landmarks before placement.
-    pub landmarks: Vec<DVec3>,
-}
-
 /// Returns a list that is computed on first use.
 fn later<T: 'static>(make: impl FnOnce() -> Arc<[T]> + Send + 'static) -> Arc<Lazy<T>> {
     Arc::new(LazyLock::new(Box::new(make)))
@@ -180,6 +169,7 @@ impl Solid {
             revolution: None,
             joints: None,
             bodies: None,
+            is_body: false,
         }
     }
 
@@ -232,12 +222,18 @@ impl Solid {
 
     /// Notes the body that this is.
     pub(super) fn with_body(self, body: PosedBody) -> Solid {
-        Solid { joints: Some(Arc::clone(&body.joints)), bodies: Some(Arc::new([body])), ..self }
+        let joints = Some(Arc::clone(&body.joints));
+        Solid { joints, bodies: Some(Arc::new([body])), is_body: true, ..self }
     }
 
     /// The bodies in it, as they are posed and placed.
     pub fn bodies(&self) -> &[PosedBody] {
         self.bodies.as_deref().unwrap_or_default()
+    }
+
+    /// The body that it is, if it is nothing but a body.
+    pub(crate) fn body(&self) -> Option<&PosedBody> {
+        self.bodies().first().filter(|_| self.is_body)
     }
 
     /// The transforms of the joints, if this is a body in a pose that has not been placed.
@@ -276,8 +272,9 @@ impl Solid {
             .map(|r| PlacedRevolution { surface: Arc::clone(&r.surface), affine: by * r.affine });
         let moved = |b: &PosedBody| PosedBody { place: by * b.place, ..b.clone() };
         let bodies = self.bodies.as_ref().map(|all| all.iter().map(moved).collect());
-        let lazy_depth = self.lazy_depth + 1;
-        Solid { instances, group: None, landmarks, lazy_depth, revolution, joints: None, bodies }
+        let (lazy_depth, is_body) = (self.lazy_depth + 1, self.is_body);
+        let (group, joints) = (None, None);
+        Solid { instances, group, landmarks, lazy_depth, revolution, joints, bodies, is_body }
             .forced_if_deep()
     }
 
@@ -343,6 +340,7 @@ impl Solid {
             revolution: None,
             joints: None,
             bodies: (!bodies.is_empty()).then(|| bodies.into()),
+            is_body: false,
         }
         .forced_if_deep()
     }
@@ -388,6 +386,9 @@ impl Solid {
 
     /// The number of vertices of all its meshes.
     pub fn vertex_count(&self) -> usize {
+        if let Some(body) = self.body() {
+            return body.body.whole().of_parts.len();
+        }
         self.instances.iter().map(|i| i.mesh.positions.len()).sum()
     }
 
@@ -396,83 +397,6 @@ impl Solid {
         self.instances
             .iter()
             .flat_map(|i| i.mesh.positions.iter().map(|p| i.affine.point(p.as_dvec3())))
-    }
-
-    /// The vector-Jacobian product of [`Solid::placed`], given derivatives with respect
-    /// to the vertices and landmarks of the placed solid, in world coordinates.
-    /// `by_vertex` is empty if nothing depends on the vertices.
-    pub fn vjp_placed(
-        &self,
-        by: Affine,
-        by_vertex: &[DVec3],
-        by_landmark: &[DVec3],
-    ) -> PlacedGradient {
-        let (mut linear, mut shift) = (DMat3::ZERO, DVec3::ZERO);
-        let back = by.0.matrix3.transpose();
-        let mut pull = |p: DVec3, by: &DVec3| {
-            linear += outer(*by, p);
-            shift += *by;
-            back * *by
-        };
-        let vertices = if by_vertex.is_empty() {
-            Vec::new()
-        } else {
-            // Places only where something depends on them.
-            let vertices =
-                self.instances.iter().flat_map(|i| i.mesh.positions.iter().map(move |p| (i, p)));
-            let vertex = |((i, p), by): ((&Instance, &Vec3), &DVec3)| match *by {
-                DVec3::ZERO => DVec3::ZERO,
-                _ => pull(i.affine.point(p.as_dvec3()), by),
-            };
-            vertices.zip(by_vertex).map(vertex).collect()
-        };
-        let landmarks =
-            self.landmarks.iter().zip(by_landmark).map(|(l, by)| pull(l.position, by)).collect();
-        PlacedGradient { linear, shift, vertices, landmarks }
-    }
-
-    /// The vector-Jacobian product of [`Solid::centred`], with arguments as in
-    /// [`Solid::vjp_placed`]. Returns the derivatives with respect to vertices and
-    /// landmarks.
-    pub fn vjp_centred(
-        &self,
-        fit: bool,
-        by_vertex: &[DVec3],
-        by_landmark: &[DVec3],
-    ) -> (Vec<DVec3>, Vec<DVec3>) {
-        let Some(b) = self.bounds() else { return (by_vertex.to_vec(), by_landmark.to_vec()) };
-        let (size, centre) = (b.size(), b.centre());
-        let half = 0.5 * size.max_element();
-        let scale = if fit && half > 0.0 { 1.0 / half } else { 1.0 };
-        let by = Affine::new(-scale * centre, DVec3::ZERO, DVec3::splat(scale));
-        if !by.is_finite() {
-            return (by_vertex.to_vec(), by_landmark.to_vec());
-        }
-        let PlacedGradient { linear, shift, mut vertices, landmarks } =
-            self.vjp_placed(by, by_vertex, by_landmark);
-        vertices.resize(self.vertex_count(), DVec3::ZERO);
-        let by_centre = shift * -scale;
-        // The derivative with respect to half the longest edge, through the scale.
-        let trace = linear.x_axis.x + linear.y_axis.y + linear.z_axis.z;
-        let by_half = if scale == 1.0 / half && fit {
-            (shift.dot(centre) - trace) * scale * scale
-        } else {
-            0.0
-        };
-        for axis in 0..3 {
-            let longest =
-                size[axis] == size.max_element() && (0..axis).all(|a| size[a] < size[axis]);
-            let by_half = if longest { 0.5 * by_half } else { 0.0 };
-            for (end, sign) in [(b.max[axis], 1.0), (b.min[axis], -1.0)] {
-                // The first vertex on that side of the box, or the nearest to it.
-                let off = |(_, p): &(usize, DVec3)| (p[axis] - end).abs();
-                let nearest = self.vertices().enumerate();
-                if let Some((v, _)) = nearest.min_by(|a, b| off(a).total_cmp(&off(b))) {
-                    vertices[v][axis] += 0.5 * by_centre[axis] + sign * by_half;
-                }
-            }
-        }
-        (vertices, landmarks)
     }
 
     /// Returns one mesh in world coordinates, for export: the faces, normals and creases

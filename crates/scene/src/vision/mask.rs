@@ -160,7 +160,13 @@ pub struct MaskLikelihood {
     observed: Mask,
     eps_in: f64,
     eps_out: f64,
+    /// The log probabilities of a pixel that is not observed on the object, and of one that is,
+    /// by the covered parts of [`PARTS`]: drawn fractions are whole numbers of them.
+    logs: Vec<[f64; 2]>,
 }
+
+/// The samples of a pixel from which fractions are drawn.
+const PARTS: usize = 256;
 
 impl MaskLikelihood {
     /// Builds the likelihood of `observed` at its own size. `eps_in` is the probability
@@ -172,13 +178,20 @@ impl MaskLikelihood {
                 return Err(VisionError::Range { name, rule: "strictly between 0 and 1", value });
             }
         }
-        Ok(MaskLikelihood { observed: observed.clone(), eps_in, eps_out })
+        let mut all =
+            MaskLikelihood { observed: observed.clone(), eps_in, eps_out, logs: Vec::new() };
+        let log = |k: usize| {
+            let fraction = k as f64 / PARTS as f64;
+            [false, true].map(|o| libm::log(all.probability(fraction, o)))
+        };
+        all.logs = (0..=PARTS).map(log).collect();
+        Ok(all)
     }
 
     /// Returns the likelihood at the rendered size: a pixel is observed on the object if
     /// at least half of its area is.
     pub fn resized(&self, width: u32, height: u32) -> Self {
-        MaskLikelihood { observed: self.observed.resized(width, height), ..*self }
+        MaskLikelihood { observed: self.observed.resized(width, height), ..self.clone() }
     }
 
     /// The observed mask at the size of comparison.
@@ -247,14 +260,16 @@ impl MaskLikelihood {
     ) -> Result<f64, VisionError> {
         self.check(coverage.len(), width, height)?;
         let mut sum = 0.0;
-        // Most pixels are covered wholly or not at all.
-        let whole = [0.0, 1.0].map(|c| [false, true].map(|o| libm::log(self.probability(c, o))));
         for (&c, &o) in coverage.iter().zip(&self.observed.data) {
-            let c = f64::from(c);
-            if c == 0.0 || c == 1.0 {
-                sum += whole[usize::from(c == 1.0)][usize::from(o)];
+            let parts = c * PARTS as f32;
+            let whole = parts as i32;
+            if whole as f32 == parts
+                && let Some(logs) = self.logs.get(whole as usize)
+            {
+                sum += logs[usize::from(o)];
                 continue;
             }
+            let c = f64::from(c);
             if !(0.0..=1.0).contains(&c) {
                 return Err(VisionError::Range {
                     name: "coverage",
@@ -282,13 +297,12 @@ impl MaskLikelihood {
     }
 
     /// Returns the derivative of [`MaskLikelihood::log_likelihood_coverage`] with respect to
-    /// the fraction of each pixel that is covered.
-    pub fn gains_coverage(&self, coverage: &[f32]) -> Vec<f64> {
-        let gain = |(c, o): (&f32, &bool)| {
-            let [miss, hit] = self.ends(*o);
-            (hit - miss) / self.probability(f64::from(*c), *o)
-        };
-        coverage.iter().zip(&self.observed.data).map(gain).collect()
+    /// the fraction of a pixel that is covered, at a fraction; 0 if there is no such pixel.
+    pub fn gain_coverage(&self, pixel: usize, fraction: f32) -> f64 {
+        self.observed.data.get(pixel).map_or(0.0, |observed| {
+            let [miss, hit] = self.ends(*observed);
+            (hit - miss) / self.probability(f64::from(fraction), *observed)
+        })
     }
 
     /// Samples a mask given the fraction of every pixel that the rendered object covers.
@@ -339,6 +353,11 @@ mod tests {
             let l = MaskLikelihood::new(&mask, 0.07, 0.2).unwrap();
             a += libm::exp(l.log_likelihood(&hard, 3, 2).unwrap());
             b += libm::exp(l.log_likelihood_coverage(&soft, 3, 2).unwrap());
+            let sum = |soft: &[f32]| l.log_likelihood_coverage(soft, 3, 2).unwrap();
+            let mut moved = soft;
+            moved[3] += 0.001;
+            let slope = (sum(&moved) - sum(&soft)) / f64::from(moved[3] - soft[3]);
+            assert!((slope - l.gain_coverage(3, 0.5005)).abs() < 1e-4);
             let same =
                 l.log_likelihood_coverage(&hard.map(|h| f32::from(u8::from(h))), 3, 2).unwrap();
             assert!((same - l.log_likelihood(&hard, 3, 2).unwrap()).abs() < 1e-12);

@@ -282,12 +282,19 @@ pub(super) fn one_of(
             if values.iter().all(|v| matches!(v, Value::Num(_) | Value::Array(_))) =>
         {
             let by = by.numbers(zs.len());
+            let mut arrays: SmallVec<[Vec<f64>; 4]> = smallvec![Vec::new(); values.len()];
             for (i, (z, g)) in zs.iter().zip(by).enumerate().filter(|(_, (_, g))| *g != 0.0) {
                 let k = *order.iter().find(|k| number(values[**k], i) == Some(*z))?;
                 match values[k] {
-                    Value::Array(_) => all[k].add_element(zs.len(), i, Adjoint::Num(g)),
+                    Value::Array(_) => {
+                        arrays[k].resize(zs.len(), 0.0);
+                        arrays[k][i] = g;
+                    }
                     _ => all[k].add(Adjoint::Num(g)),
                 }
+            }
+            for (sum, own) in all.iter_mut().zip(arrays).filter(|(_, own)| !own.is_empty()) {
+                sum.add(Adjoint::Array(own));
             }
         }
         _ => {

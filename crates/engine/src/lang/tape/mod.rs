@@ -31,6 +31,7 @@ use crate::lang::builtins::PreviousEvaluation;
 use crate::lang::value::Value;
 use op::Op;
 use pcadlang_numerics::dist::{Datum, Support};
+use pcadlang_numerics::num::ExactSum;
 use pcadlang_numerics::rng::Stream;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
@@ -66,6 +67,8 @@ pub struct Tape {
     used: Vec<Range<usize>>,
     /// The coordinates at which it was last run; empty if they are not known.
     last: Vec<f64>,
+    /// The power with which the adjoints are those of the values; `None` if they are not.
+    reversed: Option<f64>,
 }
 
 /// A power of the likelihood.
@@ -94,7 +97,7 @@ impl Tape {
         y: &mut Vec<f64>,
     ) -> bool {
         self.sums = ScoreSums::default();
-        self.last.clear();
+        self.forget();
         y.clear();
         for (i, input) in self.inputs.iter().enumerate() {
             let (x, from) = (value(i), y.len());
@@ -118,15 +121,18 @@ impl Tape {
     }
 
     /// Runs it with the images of a point of unconstrained space as values of its inputs:
-    /// as [`Tape::run_at_values`], with their coordinates in `here`.
+    /// as [`Tape::run_at_values`], with their coordinates in `here`, which need not be the same to
+    /// the last bit. If it was last run at that point, it has these values.
     pub fn run_at_images(&mut self, y: &[f64], here: &mut Vec<f64>) -> bool {
         here.clear();
-        if self.last == y && self.is_own_image(y) {
-            here.extend_from_slice(y);
-            return true;
+        let has_values = !y.is_empty() && self.last == y;
+        if has_values {
+            self.sums.jacobian = ExactSum::default();
+            self.last.clear();
+        } else {
+            self.sums = ScoreSums::default();
+            self.forget();
         }
-        self.sums = ScoreSums::default();
-        self.last.clear();
         let mut rest = y;
         for input in &self.inputs {
             let Some((own, after)) = rest.split_at_checked(input.dimension) else { return false };
@@ -153,35 +159,13 @@ impl Tape {
             };
             self.sums.jacobian.add(jacobian);
         }
-        self.forward()
-    }
-
-    /// True if coordinates are those of their images, which they need not be to the last
-    /// bit.
-    fn is_own_image(&self, y: &[f64]) -> bool {
-        let (mut rest, mut back) = (y, Vec::new());
-        self.inputs.iter().all(|input| {
-            let (own, after) = rest.split_at(input.dimension.min(rest.len()));
-            rest = after;
-            match (&input.support, own) {
-                (Support::Real, _) => true,
-                (support, [y]) if matches!(input.form, Form::Num(_)) => {
-                    support.settled(*y, support.to_free_scalar(support.from_free_scalar(*y).0))
-                        == *y
-                }
-                (support, own) => {
-                    back.clear();
-                    support.to_free(&support.from_free(own).0, &mut back);
-                    back == own
-                }
-            }
-        })
+        has_values || self.forward()
     }
 
     /// Runs it at a point of unconstrained space. False if it cannot evaluate the program
     /// there.
     pub fn run(&mut self, y: &[f64]) -> bool {
-        self.last.clear();
+        self.forget();
         let there = self.run_there(y);
         if there {
             self.last.extend_from_slice(y);
@@ -316,6 +300,12 @@ impl Tape {
         }
     }
 
+    /// What is known of the last run no longer holds.
+    fn forget(&mut self) {
+        self.last.clear();
+        self.reversed = None;
+    }
+
     fn forward(&mut self) -> bool {
         let (values, sums, Power(power)) = (&mut self.values, &mut self.sums, self.power);
         self.ops.iter_mut().all(|op| op.forward(values, sums, power))
@@ -333,7 +323,7 @@ impl Tape {
     pub fn set_power(&mut self, power: f64) -> bool {
         let changes = self.power.0 != power && !self.summed.is_empty();
         if changes {
-            self.last.clear();
+            self.forget();
         }
         self.power = Power(power);
         changes
@@ -344,16 +334,10 @@ impl Tape {
     /// Jacobians. False if one is not known.
     pub fn gradient(&mut self, y: &[f64], power: f64, out: &mut Vec<f64>) -> bool {
         out.clear();
-        if self.used.is_empty() {
-            self.adjoints.numbers.fill(0.0);
-        }
-        self.adjoints.objects.fill(Adjoint::Zero);
-        self.used.iter().for_each(|run| self.adjoints.numbers[run.clone()].fill(0.0));
-        let (values, adjoints, scratch) = (&self.values, &mut self.adjoints, &mut self.scratch);
-        if !self.ops.iter().rev().all(|op| op.reverse(values, adjoints, power, scratch)) {
+        if self.reversed != Some(power) && !self.reverse(power) {
             return false;
         }
-        let adjoints = &self.adjoints.numbers;
+        let (adjoints, scratch) = (&self.adjoints.numbers, &mut self.scratch);
         let mut rest = y;
         for input in &self.inputs {
             let Some((own, after)) = rest.split_at_checked(input.dimension) else { return false };
@@ -369,6 +353,19 @@ impl Tape {
             }
         }
         true
+    }
+
+    /// Computes the adjoints at the last run. False if a derivative is not known.
+    fn reverse(&mut self, power: f64) -> bool {
+        if self.used.is_empty() {
+            self.adjoints.numbers.fill(0.0);
+        }
+        self.adjoints.objects.fill(Adjoint::Zero);
+        self.used.iter().for_each(|run| self.adjoints.numbers[run.clone()].fill(0.0));
+        let (values, adjoints, scratch) = (&self.values, &mut self.adjoints, &mut self.scratch);
+        let known = self.ops.iter().rev().all(|op| op.reverse(values, adjoints, power, scratch));
+        self.reversed = known.then_some(power);
+        known
     }
 }
 

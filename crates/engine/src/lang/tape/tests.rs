@@ -66,6 +66,30 @@ fn densities_and_gradients_are_those_of_the_formula() {
     assert_eq!(y, [libm::log(1.5)]);
 }
 
+/// The images of a point have coordinates that may differ from it in the last bit.
+#[test]
+fn what_is_known_at_a_point_is_what_its_images_have() {
+    let (mut tape, mut fresh) = (recorded(false), recorded(false));
+    let mut moved = 0;
+    for i in 0..50 {
+        let y = [0.1 + 0.07 * f64::from(i)];
+        let [mut here, mut expected] = [Vec::new(), Vec::new()];
+        let [mut g, mut by] = [Vec::new(), Vec::new()];
+        assert!(tape.run(&y) && tape.gradient(&y, 0.5, &mut g));
+        assert!(tape.run_at_images(&y, &mut here) && fresh.run_at_images(&y, &mut expected));
+        assert_eq!((&here, tape.sums()), (&expected, fresh.sums()));
+        for power in [0.5, 2.0] {
+            assert!(tape.gradient(&here, power, &mut g) && fresh.gradient(&here, power, &mut by));
+            assert_eq!(g, by);
+        }
+        moved += i32::from(here != y);
+        assert!(tape.run(&[-0.3]) && tape.gradient(&[-0.3], 2.0, &mut g));
+        assert!(fresh.run(&[-0.3]) && fresh.gradient(&[-0.3], 2.0, &mut by));
+        assert_eq!((g, tape.sums()), (by, fresh.sums()));
+    }
+    assert!(moved > 0);
+}
+
 #[test]
 fn a_guard_says_where_the_tape_ends() {
     let mut tape = recorded(true);

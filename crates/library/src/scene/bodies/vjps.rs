@@ -19,7 +19,7 @@ pub(super) fn skin(a: &Args, posed: &Value, by: &Adjoint) -> Option<ArgAdjoints>
     let body = armature(a).ok()?;
     let solid = &posed.downcast::<SolidValue>()?.0;
     let by = BySolid::read(by, solid);
-    let vertices = if by.vertices.is_empty() { Vec::new() } else { body.vjp_parts(&by.vertices) };
+    let vertices = body.vjp_parts(&by.vertices);
     let rules = Rules { stops: stops(a, body).ok()?, inherit_scale: a.bool("inherit_scale").ok()? };
     let pose = pose(a, body).ok()?;
     if let Some(g) = body.vjp_posed(&pose, &rules, &by.landmarks, &vertices, solid.joints()).ok()? {

@@ -16,8 +16,12 @@ use std::sync::Arc;
 /// nothing depends on them.
 fn surface<'a>(made: &'a Value, by: &Adjoint) -> Option<(&'a Mesh, Vec<DVec3>)> {
     let solid = &made.downcast::<SolidValue>()?.0;
-    let vertices = BySolid::read(by, solid).vertices;
-    (!vertices.is_empty()).then_some((&solid.instances().first()?.mesh, vertices))
+    let by = BySolid::read(by, solid);
+    if by.vertices.is_empty() {
+        return None;
+    }
+    let mesh = &solid.instances().first()?.mesh;
+    Some((mesh, by.each_vertex(mesh.positions.len())))
 }
 
 /// For `scene.lathe`.
@@ -70,22 +74,19 @@ pub(super) fn cuboid(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints
 /// members.
 pub(super) fn group(a: &Args, made: &Value, by: &Adjoint) -> Option<ArgAdjoints> {
     let BySolid { landmarks, vertices } = BySolid::read(by, &made.downcast::<SolidValue>()?.0);
-    let (mut landmarks, mut vertices) = (&landmarks[..], &vertices[..]);
-    let next = |rest: &mut &[DVec3], n: usize| {
-        let (own, after) = rest.split_at(n.min(rest.len()));
-        *rest = after;
-        own.to_vec()
-    };
+    let (mut rest, mut first) = (&landmarks[..], 0);
     let mut one = |member: &Value| {
         let solid = &member.downcast::<SolidValue>()?.0;
-        let own = BySolid {
-            landmarks: next(&mut landmarks, solid.landmarks().len()),
-            vertices: if vertices.is_empty() {
-                Vec::new()
-            } else {
-                next(&mut vertices, solid.vertex_count())
-            },
-        };
+        let (landmarks, after) = rest.split_at(solid.landmarks().len().min(rest.len()));
+        rest = after;
+        let mut own = BySolid { landmarks: landmarks.to_vec(), ..BySolid::default() };
+        // Counting the vertices would build the meshes.
+        if !vertices.is_empty() {
+            let past = first + solid.vertex_count() as u32;
+            let of_it = vertices.iter().filter(|(v, _)| (first..past).contains(v));
+            own.vertices = of_it.map(|(v, by)| (v - first, *by)).collect();
+            first = past;
+        }
         Some(own.into_adjoint())
     };
     let by_members = match a.get(0) {

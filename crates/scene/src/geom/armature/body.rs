@@ -8,8 +8,11 @@
 
 use super::Rig;
 use super::morph::{Anchor, Morph};
-use crate::geom::{GeomError, Instance, Mesh, Normals, Seams, Topology, edges, outer};
+use super::whole::Whole;
+use crate::geom::{ByVertex, GeomError, Instance, Mesh, Normals, Topology, edges, outer};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A};
+use pcadlang_numerics::num::simd::vectorised;
+use std::ops::Range;
 use std::sync::{Arc, LazyLock};
 
 /// The maximum number of joints that move a vertex.
@@ -44,9 +47,11 @@ pub(super) struct Part {
     /// The joint.
     joint: u16,
     /// The triangles, with indices into the part's own vertices.
-    topology: Arc<Topology>,
+    pub topology: Arc<Topology>,
     /// For each of the part's vertices, its index in the body.
-    vertices: Vec<u32>,
+    pub vertices: Vec<u32>,
+    /// Where they are among those of all parts' meshes.
+    numbers: Range<usize>,
     /// The joints that move any of the vertices, in increasing order.
     pub joints: Vec<u16>,
 }
@@ -57,6 +62,7 @@ pub(super) struct Skin {
     triangles: Vec<[u32; 3]>,
     pub influences: Vec<Influence>,
     parts: Vec<Part>,
+    pub whole: Whole,
     morphs: Vec<Morph>,
     /// For each keypoint, what it follows when the shape changes.
     anchors: Vec<Anchor>,
@@ -119,8 +125,8 @@ pub struct RestGradient {
     pub tails: Vec<DVec3>,
     /// With respect to each keypoint.
     pub keypoints: Vec<DVec3>,
-    /// With respect to each vertex; an empty list stands for zeros.
-    pub vertices: Vec<DVec3>,
+    /// With respect to vertices.
+    pub vertices: ByVertex,
 }
 
 impl Armature {
@@ -178,7 +184,8 @@ impl Armature {
         LazyLock::force(&lazy);
         let surface = Arc::new(lazy);
         let rest = Arc::clone(&surface);
-        let skin = Skin { triangles, influences, parts, morphs: Vec::new(), anchors, rest };
+        let (whole, morphs) = (Whole::new(&parts, influences.len()), Vec::new());
+        let skin = Skin { triangles, influences, parts, whole, morphs, anchors, rest };
         Ok(Armature { rig, surface, skin: Arc::new(skin), weights: Arc::default() })
     }
 
@@ -209,6 +216,12 @@ impl Armature {
     /// The vertices at rest.
     pub fn positions(&self) -> &[Vec3] {
         &self.surface.positions
+    }
+
+    /// Returns a vertex at rest and the joints that move it.
+    pub(super) fn vertex(&self, v: u32) -> Option<(DVec3, &Influence)> {
+        let p = self.positions().get(v as usize)?;
+        Some((p.as_dvec3(), self.skin.influences.get(v as usize)?))
     }
 
     /// The triangles.
@@ -276,32 +289,33 @@ impl Armature {
         }
         let skin = Arc::clone(&self.skin);
         let reshaped = self.reshaped(&heads, &tails, &points, move |positions| {
-            for (k, amount) in added {
-                skin.morphs[k].move_vertices(amount, positions);
-            }
+            let mut all = Vec::with_capacity(3 * positions.len());
+            positions.iter().for_each(|p| all.extend_from_slice(p.as_ref()));
+            vectorised(
+                #[inline(always)]
+                || added.iter().for_each(|(k, by)| skin.morphs[*k].move_vertices(*by, &mut all)),
+            );
+            let mut moved: Vec<Vec3> = all.as_chunks().0.iter().map(|p| Vec3::from(*p)).collect();
             if cloth != 0.0 {
                 let normals = &skin.rest.normals;
-                positions.iter_mut().zip(normals).for_each(|(p, n)| *p += *n * cloth as f32);
+                moved.iter_mut().zip(normals).for_each(|(p, n)| *p += *n * cloth as f32);
             }
+            moved
         });
         Ok(Armature { weights, ..reshaped })
     }
 
     /// Returns the body with the given offsets added to joints and keypoints at rest, and
-    /// the rest vertices changed by a function.
+    /// the vertices at rest that a function makes of its own.
     pub(super) fn reshaped(
         &self,
         heads: &[DVec3],
         tails: &[DVec3],
         points: &[DVec3],
-        change: impl FnOnce(&mut [Vec3]) + Send + 'static,
+        change: impl FnOnce(&[Vec3]) -> Vec<Vec3> + Send + 'static,
     ) -> Armature {
         let (before, skin) = (Arc::clone(&self.surface), Arc::clone(&self.skin));
-        let surface = move || {
-            let mut positions = before.positions.to_vec();
-            change(&mut positions);
-            Surface::of(positions, skin)
-        };
+        let surface = move || Surface::of(change(&before.positions), skin);
         Armature {
             rig: self.rig.moved(heads, tails, points),
             surface: Arc::new(LazyLock::new(Box::new(surface))),
@@ -319,7 +333,7 @@ impl Armature {
         };
         let points =
             self.skin.anchors.iter().zip(&by.keypoints).map(|(anchor, g)| m.at(*anchor).dot(*g));
-        let vertices = m.vertices.iter().zip(&by.vertices).map(|(d, g)| d.as_dvec3().dot(*g));
+        let vertices = by.vertices.iter().filter_map(|(v, g)| Some(m.of(*v as usize)?.dot(*g)));
         Some(
             dot(&m.heads, &by.heads)
                 + dot(&m.tails, &by.tails)
@@ -331,18 +345,23 @@ impl Armature {
     /// Pulls derivatives with respect to the body at rest back to the cloth offset; see
     /// [`Armature::clothed`].
     pub fn vjp_cloth(&self, by: &RestGradient) -> f64 {
-        self.skin.rest.normals.iter().zip(&by.vertices).map(|(n, g)| n.as_dvec3().dot(*g)).sum()
+        let normals = &self.skin.rest.normals;
+        let along = |v: u32, g: DVec3| Some(normals.get(v as usize)?.as_dvec3().dot(g));
+        by.vertices.iter().filter_map(|(v, g)| along(*v, *g)).sum()
     }
 
-    /// Pulls derivatives with respect to the vertices of a posed body's meshes, in order,
-    /// back to the body's vertices. Adjacent parts share vertices, whose derivatives are
-    /// summed.
-    pub fn vjp_parts(&self, by_vertex: &[DVec3]) -> Vec<DVec3> {
-        let mut all = vec![DVec3::ZERO; self.skin.influences.len()];
-        for (v, g) in self.skin.parts.iter().flat_map(|p| &p.vertices).zip(by_vertex) {
-            all[*v as usize] += *g;
-        }
-        all
+    /// Pulls derivatives with respect to the vertices of a posed body's meshes back to the
+    /// body's vertices, some of which adjacent parts share.
+    pub fn vjp_parts(&self, by_vertex: &[(u32, DVec3)]) -> ByVertex {
+        let Whole { order, of_parts, .. } = &self.skin.whole;
+        let own =
+            |(v, g): &(u32, DVec3)| Some((*order.get(*of_parts.get(*v as usize)? as usize)?, *g));
+        by_vertex.iter().filter_map(own).collect()
+    }
+
+    /// The surface as one mesh.
+    pub(crate) fn whole(&self) -> &Whole {
+        &self.skin.whole
     }
 
     pub(super) fn skin(&self) -> Arc<Skin> {
@@ -353,16 +372,34 @@ impl Armature {
         &self.skin.parts
     }
 
-    /// Returns a part deformed by the transforms of all joints, with normals when they are
-    /// needed.
-    pub(super) fn skinned(&self, number: usize, transforms: &Arc<[Affine3A]>) -> Instance {
-        let part = &self.skin.parts[number];
+    /// Appends the vertices that a part has first in the surface as one mesh, deformed by the
+    /// transforms of all joints.
+    pub(super) fn skin_stretch(
+        &self,
+        number: usize,
+        transforms: &[Affine3A],
+        positions: &mut Vec<Vec3>,
+    ) {
+        let Whole { order, stretches, .. } = &self.skin.whole;
         let rest: &[Vec3] = &self.surface.positions;
         let place = |v: &u32| {
             let m = self.skin.blended(*v, transforms);
-            m.transform_point3a(rest[*v as usize].into()).into()
+            Vec3::from(m.transform_point3a(rest[*v as usize].into()))
         };
-        let positions = part.vertices.iter().map(place).collect();
+        positions.extend(order[stretches[number].vertices.clone()].iter().map(place));
+    }
+
+    /// Returns a part deformed by the transforms of all joints, with normals when they are
+    /// needed, given the deformed vertices of the surface as one mesh.
+    pub(super) fn skinned(
+        &self,
+        number: usize,
+        transforms: &Arc<[Affine3A]>,
+        all: &[Vec3],
+    ) -> Instance {
+        let part = &self.skin.parts[number];
+        let own = &self.skin.whole.of_parts[part.numbers.clone()];
+        let positions = own.iter().map(|v| all[*v as usize]).collect();
         let (surface, skin) = (Arc::clone(&self.surface), Arc::clone(&self.skin));
         let transforms = Arc::clone(transforms);
         let normals = Normals::later(move || {
@@ -381,7 +418,11 @@ impl Armature {
     /// given the derivatives with respect to the posed vertices (in the order of
     /// [`Armature::positions`]) and keypoints. The result is an input of
     /// [`Rig::transforms_vjp`].
-    pub fn transforms_gradient(&self, by_vertex: &[DVec3], by_keypoint: &[DVec3]) -> Vec<DAffine3> {
+    pub fn transforms_gradient(
+        &self,
+        by_vertex: &[(u32, DVec3)],
+        by_keypoint: &[DVec3],
+    ) -> Vec<DAffine3> {
         let zero = DAffine3 { matrix3: glam::DMat3::ZERO, translation: DVec3::ZERO };
         let mut out = vec![zero; self.rig.joints().len()];
         let mut add = |joint: usize, weight: f64, at: DVec3, g: DVec3| {
@@ -390,8 +431,9 @@ impl Armature {
             m.matrix3 += outer(g, at);
             m.translation += g;
         };
-        for ((p, i), g) in self.positions().iter().zip(&self.skin.influences).zip(by_vertex) {
-            i.joints().for_each(|(j, w)| add(j, w, p.as_dvec3(), *g));
+        for (v, g) in by_vertex {
+            let Some((p, i)) = self.vertex(*v) else { continue };
+            i.joints().for_each(|(j, w)| add(j, w, p, *g));
         }
         for (k, g) in self.rig.keypoints().iter().zip(by_keypoint) {
             add(k.joint, 1.0, k.rest, *g);
@@ -406,7 +448,8 @@ fn blend(
     transforms: &[Affine3A],
 ) -> Affine3A {
     let mut m = Affine3A { matrix3: Mat3A::ZERO, translation: Vec3A::ZERO };
-    for (j, w) in joints.iter().zip(weights).take_while(|(_, w)| **w > 0.0) {
+    // Those of weight 0 too: how many there are differs from vertex to vertex.
+    for (j, w) in joints.iter().zip(weights) {
         let t = &transforms[usize::from(*j)];
         m.matrix3 += t.matrix3 * *w;
         m.translation += t.translation * *w;
@@ -437,7 +480,7 @@ fn parts(rig: &Rig, triangles: &[[u32; 3]], influences: &[Influence]) -> Vec<Par
         by_joint[most].push(*t);
         sums.fill(0.0);
     }
-    let mut parts = Vec::new();
+    let mut parts: Vec<Part> = Vec::new();
     let mut own = vec![u32::MAX; influences.len()];
     for (joint, triangles) in by_joint.iter().enumerate().filter(|(_, t)| !t.is_empty()) {
         let mut vertices = Vec::new();
@@ -469,17 +512,14 @@ fn parts(rig: &Rig, triangles: &[[u32; 3]], influences: &[Influence]) -> Vec<Par
             encloses: true,
             ..Topology::default()
         };
+        let first = parts.last().map_or(0, |before| before.numbers.end);
         parts.push(Part {
             joint: joint as u16,
             topology: Arc::new(topology),
+            numbers: first..first + vertices.len(),
             vertices,
             joints: used,
         });
-    }
-    let seams = Seams::between(parts.iter().map(|p| (&p.topology.triangles[..], &p.vertices[..])));
-    let seams = Arc::new(seams);
-    for (number, part) in parts.iter_mut().enumerate() {
-        Arc::make_mut(&mut part.topology).seams = Some((Arc::clone(&seams), number));
     }
     parts
 }

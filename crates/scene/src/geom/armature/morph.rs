@@ -13,7 +13,7 @@ pub struct Morph {
     /// The amount that the body at rest has it with, often 0.
     pub weight: f64,
     /// Offsets of the vertices.
-    pub vertices: Vec<Vec3>,
+    pub vertices: Vec<[f32; 3]>,
     /// Offsets of the joints' heads, in rig order.
     pub heads: Vec<DVec3>,
     /// Offsets of the joints' tails, in rig order.
@@ -29,7 +29,7 @@ impl Morph {
                 self.name, counts[0], counts[1], counts[2]
             )));
         }
-        let finite = self.vertices.iter().all(|v| v.is_finite())
+        let finite = self.vertices.as_flattened().iter().all(|x| x.is_finite())
             && self.heads.iter().chain(&self.tails).all(|v| v.is_finite());
         if finite {
             Ok(())
@@ -38,10 +38,17 @@ impl Morph {
         }
     }
 
-    pub(super) fn move_vertices(&self, amount: f64, positions: &mut [Vec3]) {
-        for (p, d) in positions.iter_mut().zip(&self.vertices) {
-            *p += *d * amount as f32;
-        }
+    /// Moves the coordinates of all vertices in turn.
+    #[inline(always)]
+    pub(super) fn move_vertices(&self, amount: f64, coordinates: &mut [f32]) {
+        let amount = amount as f32;
+        let both = coordinates.iter_mut().zip(self.vertices.as_flattened());
+        both.for_each(|(x, d)| *x += *d * amount);
+    }
+
+    /// Returns the offset of a vertex.
+    pub(super) fn of(&self, vertex: usize) -> Option<DVec3> {
+        self.vertices.get(vertex).map(|d| Vec3::from(*d).as_dvec3())
     }
 
     pub(super) fn move_joints(&self, amount: f64, heads: &mut [DVec3], tails: &mut [DVec3]) {
@@ -54,7 +61,7 @@ impl Morph {
     pub(super) fn at(&self, anchor: Anchor) -> DVec3 {
         match anchor {
             Anchor::Head(j) => self.heads.get(j).copied().unwrap_or_default(),
-            Anchor::Vertex(v) => self.vertices.get(v).map_or(DVec3::ZERO, |d| d.as_dvec3()),
+            Anchor::Vertex(v) => self.of(v).unwrap_or_default(),
         }
     }
 }

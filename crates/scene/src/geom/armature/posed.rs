@@ -4,7 +4,8 @@
 use super::body::{Armature, Part};
 use super::{JointPose, Keypoint, PosedBody, Rules};
 use crate::geom::{GeomError, Instance, Landmark, Solid};
-use glam::{Affine3A, DAffine3};
+use glam::{Affine3A, DAffine3, Vec3};
+use smallvec::SmallVec;
 use std::sync::{Arc, OnceLock};
 
 /// A pose's transforms and meshes, from which the next pose starts. Meshes are made when
@@ -12,12 +13,18 @@ use std::sync::{Arc, OnceLock};
 #[derive(Debug)]
 pub struct Posed(Arc<Pose>);
 
+/// A body's surface in a pose, made when it is needed.
 #[derive(Debug)]
-struct Pose {
-    body: Arc<Armature>,
+pub(crate) struct Pose {
+    pub body: Arc<Armature>,
     transforms: Arc<[Affine3A]>,
+    /// The vertices of the surface as one mesh, before the body is placed.
+    positions: OnceLock<Vec<Vec3>>,
     parts: OnceLock<Vec<Instance>>,
 }
+
+/// For each part, whether it moves as in another pose.
+pub(crate) type Stays = SmallVec<[bool; 64]>;
 
 /// The bits that identify a transform. Equal numbers do not suffice: 0 and -0 can produce
 /// results that differ in the sign of zeros.
@@ -26,20 +33,44 @@ fn bits(t: &Affine3A) -> [u32; 12] {
 }
 
 impl Pose {
+    /// Which parts move as in a pose before; none if that is of another body.
+    pub fn stays(&self, before: Option<&Pose>) -> Stays {
+        let Some(before) = before.filter(|b| Arc::ptr_eq(&b.body, &self.body)) else {
+            return SmallVec::from_elem(false, self.body.parts().len());
+        };
+        let both = self.transforms.iter().zip(before.transforms.iter());
+        let same: SmallVec<[bool; 64]> = both.map(|(a, b)| bits(a) == bits(b)).collect();
+        let stays = |part: &Part| part.joints.iter().all(|j| same[usize::from(*j)]);
+        self.body.parts().iter().map(stays).collect()
+    }
+
+    /// The vertices of the surface as one mesh, before the body is placed. If they were not
+    /// known, those of parts that move as in `before` are its, if they are known there.
+    pub fn positions(&self, before: Option<&Pose>) -> &[Vec3] {
+        self.positions.get_or_init(|| {
+            let before = before.filter(|before| before.positions.get().is_some());
+            let known = before.and_then(|b| b.positions.get()).map_or(&[][..], |all| all);
+            let stretches = &self.body.whole().stretches;
+            let mut positions = Vec::with_capacity(self.body.whole().order.len());
+            for (k, (stretch, stays)) in stretches.iter().zip(self.stays(before)).enumerate() {
+                match known.get(stretch.vertices.clone()).filter(|_| stays) {
+                    Some(same) => positions.extend_from_slice(same),
+                    None => self.body.skin_stretch(k, &self.transforms, &mut positions),
+                }
+            }
+            positions
+        })
+    }
+
     /// The mesh of each part; those that moved in the same way in `before` are its.
     fn parts(&self, before: Option<&Pose>) -> &[Instance] {
         self.parts.get_or_init(|| {
-            let before = before.and_then(|b| b.parts.get().map(|parts| (&b.transforms, parts)));
-            let make = |(i, part): (usize, &Part)| {
-                let moved = |t: &[Affine3A], j: &u16| t.get(usize::from(*j)).map(bits);
-                let same = before.and_then(|(transforms, parts)| {
-                    let mut joints = part.joints.iter();
-                    let same = joints.all(|j| moved(transforms, j) == moved(&self.transforms, j));
-                    parts.get(i).filter(|_| same).cloned()
-                });
-                same.unwrap_or_else(|| self.body.skinned(i, &self.transforms))
+            let known = before.and_then(|b| b.parts.get()).map_or(&[][..], |all| all);
+            let make = |(i, stays): (usize, bool)| match known.get(i).filter(|_| stays) {
+                Some(same) => same.clone(),
+                None => self.body.skinned(i, &self.transforms, self.positions(before)),
             };
-            self.body.parts().iter().enumerate().map(make).collect()
+            self.stays(before).into_iter().enumerate().map(make).collect()
         })
     }
 }
@@ -54,8 +85,8 @@ impl Posed {
     ) -> (Posed, impl FnOnce() -> Vec<Instance> + Send + 'static) {
         let is_made = |b: &&Posed| Arc::ptr_eq(&b.0.body, body) && b.0.parts.get().is_some();
         let before = before.filter(is_made).map(|b| Arc::clone(&b.0));
-        let pose = Pose { body: Arc::clone(body), transforms, parts: OnceLock::new() };
-        let pose = Arc::new(pose);
+        let (positions, parts) = (OnceLock::new(), OnceLock::new());
+        let pose = Arc::new(Pose { body: Arc::clone(body), transforms, positions, parts });
         let own = Arc::clone(&pose);
         (Posed(pose), move || own.parts(before.as_deref()).to_vec())
     }
@@ -97,7 +128,7 @@ impl Armature {
             };
             body.rig().keypoints().iter().map(landmark).collect()
         };
-        let posed_body = PosedBody::new(Arc::clone(self), transforms);
+        let posed_body = PosedBody::new(Arc::clone(&posed.0), transforms);
         let solid = Solid::of_parts(parts).with_body(posed_body);
         // A rig's keypoints have different names; `#` starts the numbers of others.
         let solid = match self.rig().keypoints().iter().any(|k| k.name.contains('#')) {

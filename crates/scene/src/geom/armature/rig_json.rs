@@ -6,7 +6,7 @@
 
 use super::{Influence, MOST_WEIGHTS, Morph, NamedJoint, Rig};
 use crate::geom::GeomError;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use indexmap::IndexMap;
 use serde::Deserialize;
 
@@ -140,7 +140,7 @@ pub fn morphs_from_json(bytes: &[u8], rig: &Rig) -> Result<Vec<Morph>, GeomError
     let one = |(name, m): (String, JsonMorph)| {
         Ok(Morph {
             weight: 0.0,
-            vertices: m.vertices.into_iter().map(Vec3::from).collect(),
+            vertices: m.vertices,
             heads: by_rig(&name, &m.heads)?,
             tails: by_rig(&name, &m.tails)?,
             name: name.into(),

@@ -1,7 +1,7 @@
 //! Bodies as they stand in a scene: where each joint is and how it is turned, as programs for
 //! animation have it.
 
-use super::Armature;
+use super::{Armature, Pose};
 use crate::geom::Affine;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use std::sync::Arc;
@@ -15,6 +15,8 @@ pub struct PosedBody {
     pub joints: Arc<[DAffine3]>,
     /// Where the posed body is placed.
     pub place: Affine,
+    /// Its surface.
+    pub(crate) pose: Arc<Pose>,
 }
 
 /// A joint of a posed body. A chain of bones has it at `head` exactly: from the parent's head,
@@ -42,8 +44,15 @@ pub struct Bone {
 
 impl PosedBody {
     /// A body that has not been placed.
-    pub(super) fn new(body: Arc<Armature>, joints: Arc<[DAffine3]>) -> PosedBody {
-        PosedBody { body, joints, place: Affine::IDENTITY }
+    pub(super) fn new(pose: Arc<Pose>, joints: Arc<[DAffine3]>) -> PosedBody {
+        PosedBody { body: Arc::clone(&pose.body), joints, place: Affine::IDENTITY, pose }
+    }
+
+    /// Returns a vertex of the posed parts' meshes, by its number, in the scene.
+    pub(crate) fn vertex(&self, number: u32) -> Option<DVec3> {
+        let at = *self.body.whole().of_parts.get(number as usize)?;
+        let p = self.pose.positions(None).get(at as usize)?;
+        Some(self.place.point(p.as_dvec3()))
     }
 
     /// Returns the joints in rig order, in the scene's axes, with lengths in scene units.

@@ -52,9 +52,8 @@ impl Armature {
             self.rig().keypoints().iter().map(|k| offset(k.joint, k.rest)).collect();
         let skin = self.skin();
         Ok(self.reshaped(&heads, &tails, &points, move |positions| {
-            for (p, i) in positions.iter_mut().zip(&skin.influences) {
-                *p = i.blend(&maps, p.as_dvec3()).as_vec3();
-            }
+            let blended = |(p, i): (&Vec3, &Influence)| i.blend(&maps, p.as_dvec3()).as_vec3();
+            positions.iter().zip(&skin.influences).map(blended).collect()
         }))
     }
 }
@@ -95,14 +94,11 @@ impl Armature {
         out.tails = tails.map(|(j, g)| take(j, joints[j].tail, *g)).collect();
         let points = rig.keypoints().iter().zip(&by.keypoints);
         out.keypoints = points.map(|(k, g)| take(k.joint, k.rest, *g)).collect();
-        if !by.vertices.is_empty() {
-            let skin = self.skin();
-            let vertices = self.positions().iter().zip(&skin.influences).zip(&by.vertices);
-            let vertex = |((p, i), g): ((&Vec3, &Influence), &DVec3)| {
-                i.joints().map(|(j, w)| take(j, p.as_dvec3(), *g * w)).sum::<DVec3>()
-            };
-            out.vertices = vertices.map(vertex).collect();
-        }
+        let vertex = |(v, g): &(u32, DVec3)| {
+            let (p, i) = self.vertex(*v)?;
+            Some((*v, i.joints().map(|(j, w)| take(j, p, *g * w)).sum()))
+        };
+        out.vertices = by.vertices.iter().filter_map(vertex).collect();
         for j in (0..joints.len()).rev() {
             let g = by_new_head[j];
             match joints[j].parent {

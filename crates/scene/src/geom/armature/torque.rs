@@ -2,9 +2,9 @@
 //! points into torques about joints, in time linear in the number of joints.
 //! [`Rig::transforms_vjp`] is the general method, for any pose.
 
-use super::{Armature, Influence, JointPose, RestGradient, Rules, Turn};
+use super::{Armature, JointPose, RestGradient, Rules, Turn};
 use crate::geom::GeomError;
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3};
 
 /// Derivatives with respect to the inputs of posing.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,10 +17,9 @@ pub struct BodyGradient {
 
 impl Armature {
     /// The vector-Jacobian product of [`Armature::posed`] for rotation vectors, given the
-    /// derivatives with respect to the posed keypoints and vertices (in the order of
-    /// [`Armature::positions`]; empty if nothing depends on them). `None` if the pose has
-    /// anything but rotation vectors, or if scales are inherited. `joints` are the
-    /// transforms of the pose, if they are known.
+    /// derivatives with respect to the posed keypoints (empty if nothing depends on them) and
+    /// vertices. `None` if the pose has anything but rotation vectors, or if scales are
+    /// inherited. `joints` are the transforms of the pose, if they are known.
     ///
     /// # Errors
     /// A pose that is not finite.
@@ -29,7 +28,7 @@ impl Armature {
         pose: &[JointPose],
         rules: &Rules,
         by_keypoint: &[DVec3],
-        by_vertex: &[DVec3],
+        by_vertex: &[(u32, DVec3)],
         joints: Option<&[DAffine3]>,
     ) -> Result<Option<BodyGradient>, GeomError> {
         let rig = self.rig();
@@ -48,25 +47,22 @@ impl Armature {
                 &made
             }
         };
-        // For each joint, sums over everything attached to it: the derivatives (forces),
-        // and p x g (torques about the origin).
-        let (mut force, mut torque) = (vec![DVec3::ZERO; count], vec![DVec3::ZERO; count]);
-        let mut hang = |joint: usize, rest: DVec3, g: DVec3| {
-            let t = &transforms[joint];
-            force[joint] += g;
-            torque[joint] += t.transform_point3(rest).cross(g);
-            t.matrix3.transpose() * g
-        };
+        let back = |joint: usize, g: DVec3| transforms[joint].matrix3.transpose() * g;
         let points = rig.keypoints().iter().zip(by_keypoint);
-        let keypoints = points.map(|(k, g)| hang(k.joint, k.rest, *g)).collect();
-        let vertex = |((p, i), g): ((&Vec3, &Influence), &DVec3)| match *g {
-            DVec3::ZERO => DVec3::ZERO,
-            g => i.joints().map(|(j, w)| hang(j, p.as_dvec3(), g * w)).sum(),
+        let keypoints = points.map(|(k, g)| back(k.joint, *g)).collect();
+        let vertex = |(v, g): &(u32, DVec3)| {
+            Some((*v, self.vertex(*v)?.1.joints().map(|(j, w)| back(j, *g * w)).sum()))
         };
-        let vertices = match by_vertex {
-            [] => Vec::new(),
-            by => self.positions().iter().zip(self.influences()).zip(by).map(vertex).collect(),
+        let vertices = by_vertex.iter().filter_map(vertex).collect();
+        // For each joint, sums over everything attached to it: the derivatives (forces),
+        // and p x g (torques about the origin), p being linear in the point at rest.
+        let by_transform = self.transforms_gradient(by_vertex, by_keypoint);
+        let mut force: Vec<DVec3> = by_transform.iter().map(|by| by.translation).collect();
+        let about = |(t, by): (&DAffine3, &DAffine3)| {
+            let axes = (0..3).map(|k| t.matrix3.col(k).cross(by.matrix3.col(k)));
+            axes.sum::<DVec3>() + t.translation.cross(by.translation)
         };
+        let mut torque: Vec<DVec3> = transforms.iter().zip(&by_transform).map(about).collect();
         let (mut turns, mut heads) = (vec![DVec3::ZERO; count], vec![DVec3::ZERO; count]);
         for j in (0..count).rev() {
             let joint = &rig.joints()[j];

@@ -155,10 +155,10 @@ impl Loaded {
             return Ok(body);
         }
         let morph = |m: &LoadedMorph| {
-            let mut all = vec![Vec3::ZERO; vertices];
+            let mut all = vec![[0.0; 3]; vertices];
             for (v, by) in &m.offsets {
                 if let Some(place) = number(*v).and_then(|v| all.get_mut(v as usize)) {
-                    *place = *by;
+                    *place = by.to_array();
                 }
             }
             Morph {

@@ -7,6 +7,7 @@
 //! outline is taken from the contours: where a coarse mesh covers pixels beyond its
 //! smooth silhouette, that part of it is missed.
 
+use crate::geom::ByVertex;
 use crate::render::View;
 use crate::render::derivatives::vjp::vjp_some;
 use glam::DVec3;
@@ -27,22 +28,24 @@ impl View {
         })
     }
 
-    /// The same of the sum of `gain` times the fraction of each pixel that shows the solid,
-    /// [`View::fractions`], which is not a step function.
-    pub fn vjp_fractions(&self, size: u32, gain: &[f64]) -> Vec<DVec3> {
+    /// The same of the sum of the fraction of each pixel that shows the solid, [`View::fractions`],
+    /// times the pixel's `gain`. The sum is not a step function.
+    /// It has the vertices at the outline.
+    pub fn vjp_fractions(&self, size: u32, gain: impl Fn(usize) -> f64) -> ByVertex {
         let camera = self.camera().scaled_to(size);
-        if let Some(by_vertex) = self.covered(size).vjp(self.solid(), &camera, gain) {
+        if let Some(by_vertex) = self.covered(size).vjp(self.solid(), &camera, &gain) {
             return by_vertex;
         }
-        self.vjp_outline(size, |picture, piece, length| {
+        let by_vertex = self.vjp_outline(size, |picture, piece, length| {
             let [x, y, tx, ty] = piece.map(f64::from);
             // A piece may run through several pixels.
             let part = |k: i32| {
                 let along = f64::from(length) * f64::from(2 * k + 1 - PARTS) / f64::from(2 * PARTS);
-                picture.at(gain, x + along * tx, y + along * ty)
+                gain(picture.at(x + along * tx, y + along * ty))
             };
             (0..PARTS).map(part).sum::<f64>() / f64::from(PARTS)
-        })
+        });
+        (0..).zip(by_vertex).filter(|(_, by)| *by != DVec3::ZERO).collect()
     }
 
     /// The same where a motion of the outline by a pixel gains `gain` for each pixel of its
@@ -93,11 +96,11 @@ impl DepthImage<'_> {
         }
     }
 
-    /// The value of the pixel at a position.
-    fn at(&self, values: &[f64], x: f64, y: f64) -> f64 {
+    /// The pixel at a position, or the nearest one.
+    fn at(&self, x: f64, y: f64) -> usize {
         let (w, h) = (self.width as usize, self.height as usize);
         let (i, j) = ((x.max(0.0) as usize).min(w - 1), (y.max(0.0) as usize).min(h - 1));
-        values.get(j * w + i).copied().unwrap_or(0.0)
+        j * w + i
     }
 
     /// The value interpolated bilinearly between pixel centres.
@@ -225,7 +228,13 @@ mod tests {
         let block = cuboid(Vec3::new(1.4, 1.0, 0.8));
         for solid in [sphere(96, 48), block] {
             // The outline moves by about 0.03 pixels: 8 steps of the fractions.
-            check_slopes(&solid, SIZE, sum, |view| view.vjp_fractions(SIZE, &gain), (0.003, 3.0));
+            let vjp = |view: &View| {
+                let mut all = vec![DVec3::ZERO; view.solid().vertex_count()];
+                let some = view.vjp_fractions(SIZE, |pixel| gain[pixel]);
+                some.into_iter().for_each(|(v, by)| all[v as usize] += by);
+                all
+            };
+            check_slopes(&solid, SIZE, sum, vjp, (0.003, 3.0));
         }
     }
 

@@ -9,6 +9,7 @@
 
 use crate::geom::{Affine, Instance, Mesh, Solid};
 use crate::render::canvas::{affine_bits, camera_bits};
+use crate::render::pixels::body_outline::FollowedBody;
 use crate::render::pixels::place::Point;
 use crate::render::pixels::project::{Lens, Placement, Projected, Vertices};
 use crate::render::pixels::raster::{back_of, cut_triangles};
@@ -40,6 +41,8 @@ pub(in crate::render) struct Outline {
     /// By its bits.
     camera: [u64; 17],
     meshes: Vec<Followed>,
+    /// The body that the solid is, if it is one; then there are no meshes.
+    pub body: Option<FollowedBody>,
     /// The sides where faces end, in samples.
     pub edges: Vec<Edge>,
     /// The crossings between a sample that is covered and one that is not, row by row.
@@ -53,20 +56,15 @@ struct Followed {
     /// The index of its first vertex among all, and of its sides.
     first: u32,
     edges: Range<usize>,
-    /// For its sides of one face, which of its sides they are here; [`NONE`] if not any.
-    open: Vec<u32>,
 }
 
-const NONE: u32 = u32::MAX;
-
 impl Outline {
-    /// The sides of mesh `i`, and which have one face, if it was the same at the same place.
-    fn same(&self, i: usize, item: &Instance, first: u32) -> Option<(&[Edge], &[u32])> {
+    /// The sides of mesh `i`, if it was the same at the same place.
+    fn same(&self, i: usize, item: &Instance, first: u32) -> Option<&[Edge]> {
         let was = self.meshes.get(i)?;
         let same = Arc::ptr_eq(&was.mesh, &item.mesh) && was.first == first;
         let same = same && affine_bits(&was.affine) == affine_bits(&item.affine);
-        let edges = self.edges.get(was.edges.clone()).filter(|_| same)?;
-        Some((edges, &was.open))
+        self.edges.get(was.edges.clone()).filter(|_| same)
     }
 }
 
@@ -90,16 +88,19 @@ impl Fractions {
         let before =
             before.and_then(|b| b.outline.as_ref()).filter(|b| b.camera == camera_bits(camera));
         let mut samples = Samples::none(camera.width as usize, camera.height as usize);
+        if let Some(body) = solid.body() {
+            let before = before.and_then(|b| Some((b.body.as_ref()?, &b.edges[..])));
+            if let Some(body) = samples.add_body(body, camera, before) {
+                return Some(samples.into_fractions(camera, Vec::new(), Some(body), true));
+            }
+        }
         let (lens, mut whole, mut first) = (Lens::new(camera), true, 0);
         let mut meshes = Vec::with_capacity(solid.instances().len());
-        SCRATCH.with_borrow_mut(|Scratch { projected, rows, drawn }| {
+        SCRATCH.with_borrow_mut(|Scratch { projected, drawn, .. }| {
             for (i, item) in solid.instances().iter().enumerate() {
-                let (begin, mut open) = (samples.edges.len(), Vec::new());
+                let begin = samples.edges.len();
                 match before.and_then(|b| b.same(i, item, first)) {
-                    Some((edges, known)) => {
-                        samples.edges.extend_from_slice(edges);
-                        open.extend_from_slice(known);
-                    }
+                    Some(edges) => samples.edges.extend_from_slice(edges),
                     None => {
                         let placement = Placement::new(camera, &item.affine);
                         projected.clear();
@@ -109,8 +110,7 @@ impl Fractions {
                         if vertices.outside(camera) {
                         } else if vertices.whole {
                             let back = back_of(&item.mesh, &placement, true);
-                            let found = (&mut *drawn, &mut open);
-                            samples.add_mesh(&item.mesh, &vertices, back, first, found);
+                            samples.add_mesh(&item.mesh, &vertices, back, first, drawn);
                         } else {
                             samples.add_cut(&item.mesh, &placement, camera, &vertices);
                         }
@@ -118,16 +118,11 @@ impl Fractions {
                 }
                 let (mesh, affine) = (Arc::clone(&item.mesh), item.affine);
                 let edges = begin..samples.edges.len();
-                meshes.push(Followed { mesh, affine, first, edges, open });
+                meshes.push(Followed { mesh, affine, first, edges });
                 first += item.mesh.positions.len() as u32;
             }
-            samples.join(&meshes);
-            let (values, crossings) = samples.count(rows);
-            let Samples { edges, .. } = samples;
-            let outline =
-                whole.then_some(Outline { camera: camera_bits(camera), meshes, edges, crossings });
-            Some(Fractions { values, outline })
-        })
+        });
+        Some(samples.into_fractions(camera, meshes, None, whole))
     }
 
     /// Those in a finer picture, drawn by `draw`: for what has no mesh, and for pictures so
@@ -172,6 +167,10 @@ struct RowLists {
     /// Where each row's crossings begin among all of them.
     begins: Vec<u32>,
     all: Vec<u64>,
+    /// For a row of pixels, the covered samples of each less those of the one before it.
+    steps: Vec<i32>,
+    /// The fraction of each pixel.
+    values: Vec<f32>,
 }
 
 /// A side from its upper to its lower end, in samples: whole numbers are their places.
@@ -193,7 +192,7 @@ impl Edge {
     /// From a side that enters this number of faces, from left to right, if it leads downwards, in a
     /// picture with this number of rows.
     #[inline(always)]
-    fn new(ends: [[f64; 2]; 2], [v, w]: [u32; 2], faces: i32, rows: usize) -> Edge {
+    pub fn new(ends: [[f64; 2]; 2], [v, w]: [u32; 2], faces: i32, rows: usize) -> Edge {
         let ([from, to], vertices, faces) = match ends[0][1] > ends[1][1] {
             true => ([ends[1], ends[0]], [w, v], -faces),
             false => (ends, [v, w], faces),
@@ -203,10 +202,10 @@ impl Edge {
         Edge { from, to, slope, faces, vertices, rows }
     }
 
-    /// True if it adds, at the same place, what the other takes away.
-    fn undoes(&self, other: &Edge) -> bool {
-        let bits = |e: &Edge| [e.from, e.to].map(|p| p.map(f64::to_bits));
-        self.faces == -other.faces && bits(self) == bits(other)
+    /// True if it crosses a row.
+    #[inline(always)]
+    pub fn counts(&self) -> bool {
+        self.rows[0] < self.rows[1]
     }
 
     /// Where it crosses a row.
@@ -224,15 +223,21 @@ fn first(v: f64, most: f64) -> u32 {
 
 /// A position in the picture, in samples.
 #[inline(always)]
-fn in_samples(p: &Point) -> [f64; 2] {
-    [p.x * COLUMNS as f64 - 0.5, p.y * ROWS as f64 - 0.5]
+pub(super) fn in_samples([x, y]: [f64; 2]) -> [f64; 2] {
+    [x * COLUMNS as f64 - 0.5, y * ROWS as f64 - 0.5]
 }
 
 /// The double area of a triangle in the picture, above 0 where the corners follow each other
 /// clockwise.
 #[inline(always)]
-fn clockwise([a, b, c]: &[Point; 3]) -> f64 {
-    (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
+pub(super) fn clockwise([a, b, c]: [[f64; 2]; 3]) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+/// The place of a point in the picture.
+#[inline(always)]
+fn place(p: &Point) -> [f64; 2] {
+    [p.x, p.y]
 }
 
 /// How the faces of a mesh are drawn: 1 counter-clockwise, -1 clockwise, 0 not, as it has the
@@ -242,7 +247,7 @@ fn faces(mesh: &Mesh, vertices: &Vertices<'_>, back: f64, drawn: &mut Vec<i8>) {
     let triangles = &mesh.topology.triangles;
     drawn.resize(triangles.len() + 1, 0);
     for (drawn, corners) in drawn.iter_mut().zip(triangles) {
-        let turn = clockwise(&corners.map(|v| vertices.point(v)));
+        let turn = clockwise(corners.map(|v| place(&vertices.point(v))));
         *drawn = match back == 0.0 {
             true => 1 - 2 * i8::from(turn > 0.0),
             false => i8::from(turn * back <= 0.0) * if back > 0.0 { 1 } else { -1 },
@@ -252,14 +257,12 @@ fn faces(mesh: &Mesh, vertices: &Vertices<'_>, back: f64, drawn: &mut Vec<i8>) {
 }
 
 /// A picture's rows of samples, and the sides that cross them.
-struct Samples {
+pub(super) struct Samples {
     /// In pixels.
     width: usize,
     /// Of samples.
-    rows: usize,
-    edges: Vec<Edge>,
-    /// Which of them do not count, as their faces go on in another part of their surface.
-    joined: Vec<bool>,
+    pub rows: usize,
+    pub edges: Vec<Edge>,
 }
 
 /// Bits of the number of faces in a crossing, of which this is none, and of the side's index.
@@ -269,39 +272,33 @@ const EDGE_BITS: u32 = 32;
 
 impl Samples {
     fn none(width: usize, height: usize) -> Samples {
-        let edges = Vec::with_capacity(512);
-        Samples { width, rows: height * ROWS, edges, joined: Vec::new() }
+        Samples { width, rows: height * ROWS, edges: Vec::with_capacity(512) }
     }
 
     /// Adds the sides where faces of a mesh that is beyond the near plane end, save those of
     /// faces with the orientation `back`. `first` is the index of its first vertex among all.
-    /// Finds how faces are drawn, and which of these sides are those of one face.
+    /// Finds how faces are drawn.
     fn add_mesh(
         &mut self,
         mesh: &Mesh,
         vertices: &Vertices<'_>,
         back: f64,
         first: u32,
-        (drawn, open): (&mut Vec<i8>, &mut Vec<u32>),
+        drawn: &mut Vec<i8>,
     ) {
-        let (sides, open_count) = mesh.topology.sides.of(&mesh.topology.triangles);
-        let begin = self.edges.len();
-        open.resize(open_count, NONE);
+        let sides = mesh.topology.sides.of(&mesh.topology.triangles);
         vectorised(
             #[inline(always)]
             || {
                 faces(mesh, vertices, back, drawn);
-                for (k, side) in sides.iter().enumerate() {
+                for side in sides {
                     let [own, other] = side.faces.map(|f| drawn.get(f as usize).copied());
                     let faces = own.unwrap_or(0) - other.unwrap_or(0);
                     if faces != 0 {
-                        let ends = side.vertices.map(|v| in_samples(&vertices.point(v)));
+                        let ends = side.vertices.map(|v| in_samples(place(&vertices.point(v))));
                         let places = side.vertices.map(|v| first + v);
                         let edge = Edge::new(ends, places, i32::from(faces), self.rows);
-                        if edge.rows[0] < edge.rows[1] {
-                            if let Some(open) = open.get_mut(k) {
-                                *open = (self.edges.len() - begin) as u32;
-                            }
+                        if edge.counts() {
                             self.edges.push(edge);
                         }
                     }
@@ -312,15 +309,15 @@ impl Samples {
 
     /// Adds a triangle in the picture, whichever way it turns.
     fn add(&mut self, points: &[Point; 3]) {
-        let turn = clockwise(points);
-        let places = points.each_ref().map(in_samples);
+        let places = points.each_ref().map(place);
+        let (turn, places) = (clockwise(places), places.map(in_samples));
         if !turn.is_finite() {
             return;
         }
         for (i, j) in [(0, 1), (1, 2), (2, 0)] {
             let faces = if turn > 0.0 { -1 } else { 1 };
             let edge = Edge::new([places[i], places[j]], [0; 2], faces, self.rows);
-            if edge.rows[0] < edge.rows[1] {
+            if edge.counts() {
                 self.edges.push(edge);
             }
         }
@@ -343,47 +340,13 @@ impl Samples {
         });
     }
 
-    /// Finds the sides at which a part of a surface goes on in another, so that one adds what
-    /// the other takes away.
-    fn join(&mut self, meshes: &[Followed]) {
-        self.joined.clear();
-        self.joined.resize(self.edges.len(), false);
-        let mut rest = meshes;
-        while let Some(first) = rest.first() {
-            let Some((seams, 0)) = &first.mesh.topology.seams else {
-                rest = &rest[1..];
-                continue;
-            };
-            let part = |(number, m): &(usize, &Followed)| {
-                let own = m.mesh.topology.seams.as_ref();
-                own.is_some_and(|(of, n)| Arc::ptr_eq(of, seams) && n == number)
-            };
-            let (parts, after) = rest.split_at(rest.iter().enumerate().take_while(part).count());
-            rest = after;
-            for pair in &seams.0 {
-                let found = pair.map(|[part, side]| {
-                    let part = parts.get(part as usize)?;
-                    let side = *part.open.get(side as usize)?;
-                    (side != NONE).then(|| part.edges.start + side as usize)
-                });
-                let [Some(a), Some(b)] = found else { continue };
-                if self.edges[a].undoes(&self.edges[b]) {
-                    (self.joined[a], self.joined[b]) = (true, true);
-                }
-            }
-        }
-    }
-
     /// Puts in order what is crossed in each row.
     #[inline(always)]
-    fn sort(&self, RowLists { begins, all }: &mut RowLists) {
+    fn sort(&self, RowLists { begins, all, .. }: &mut RowLists) {
         // How many more are crossed in a row than in the one before it, then the sums.
         begins.clear();
         begins.resize(self.rows + 2, 0);
-        for (edge, joined) in self.edges.iter().zip(&self.joined) {
-            if *joined {
-                continue;
-            }
+        for edge in &self.edges {
             let [begin, end] = edge.rows.map(|row| row as usize + 1);
             begins[begin] = begins[begin].wrapping_add(1);
             begins[end] = begins[end].wrapping_sub(1);
@@ -397,10 +360,7 @@ impl Samples {
         all.clear();
         all.resize(sum as usize, 0);
         let most = (self.width * COLUMNS) as f64;
-        for ((i, edge), joined) in (0u64..).zip(&self.edges).zip(&self.joined) {
-            if *joined {
-                continue;
-            }
+        for (i, edge) in (0u64..).zip(&self.edges) {
             let [begin, end] = edge.rows;
             let own = i << FACES_BITS | (edge.faces + NO_FACES) as u64;
             for (row, next) in (begin..end).zip(&mut begins[begin as usize + 1..]) {
@@ -414,65 +374,82 @@ impl Samples {
         }
     }
 
+    /// Those of what was followed; with the outline if all of it is beyond the near plane.
+    fn into_fractions(
+        self,
+        camera: &Camera,
+        meshes: Vec<Followed>,
+        body: Option<FollowedBody>,
+        whole: bool,
+    ) -> Fractions {
+        let (values, crossings) = SCRATCH.with_borrow_mut(|scratch| self.count(&mut scratch.rows));
+        let (camera, edges) = (camera_bits(camera), self.edges);
+        let outline = Outline { camera, meshes, body, edges, crossings };
+        Fractions { values, outline: whole.then_some(outline) }
+    }
+
     /// The fraction of each pixel, and where covered samples begin and end.
     fn count(&self, lists: &mut RowLists) -> (Arc<[f32]>, Vec<Crossing>) {
-        let mut counts = vec![0u16; self.width * self.rows / ROWS];
         let mut crossings = Vec::with_capacity(4 * self.rows);
         vectorised(
             #[inline(always)]
             || {
                 self.sort(lists);
-                for row in 0..self.rows {
-                    let [begin, end] = [row, row + 1].map(|row| lists.begins[row] as usize);
-                    let pixels = row / ROWS * self.width..(row / ROWS + 1) * self.width;
-                    let list = &lists.all[begin..end];
-                    row_of(list, row as u32, &mut counts[pixels], &mut crossings);
+                let RowLists { begins, all, steps, values } = &mut *lists;
+                values.clear();
+                for pixels in 0..self.rows / ROWS {
+                    steps.clear();
+                    steps.resize(self.width + 2, 0);
+                    for row in pixels * ROWS..(pixels + 1) * ROWS {
+                        let [begin, end] = [row, row + 1].map(|row| begins[row] as usize);
+                        row_of(&all[begin..end], row as u32, steps, &mut crossings);
+                    }
+                    let mut count = 0;
+                    values.extend(steps[..self.width].iter().map(|step| {
+                        count += step;
+                        count as f32 / (COLUMNS * ROWS) as f32
+                    }));
                 }
             },
         );
-        let fraction = |count: u16| f32::from(count) / (COLUMNS * ROWS) as f32;
-        (counts.into_iter().map(fraction).collect(), crossings)
+        (lists.values.as_slice().into(), crossings)
     }
 }
 
-/// Counts the covered samples of a row by pixel, from what is crossed in it, in order.
+/// Follows a row of samples by what is crossed in it, in order, and adds to the covered samples of
+/// each pixel less those of the pixel before it.
 #[inline(always)]
-fn row_of(list: &[u64], row: u32, counts: &mut [u16], crossings: &mut Vec<Crossing>) {
-    let (mut faces, mut begin, mut rest) = (0, 0, list);
-    while let Some(next) = rest.first() {
-        let column = next >> (FACES_BITS + EDGE_BITS);
-        let before = faces;
-        let change = |key: &u64| (key & ((1 << FACES_BITS) - 1)) as i32 - NO_FACES;
-        let here = rest.iter().take_while(|key| *key >> (FACES_BITS + EDGE_BITS) == column);
-        faces += here.clone().map(change).sum::<i32>();
+fn row_of(list: &[u64], row: u32, steps: &mut [i32], crossings: &mut Vec<Crossing>) {
+    const COLUMN: u32 = FACES_BITS + EDGE_BITS;
+    let change = |key: u64| (key & ((1 << FACES_BITS) - 1)) as i32 - NO_FACES;
+    let mut step = |column: usize, by: i32| {
+        let within = (column % COLUMNS) as i32;
+        if let Some([here, next]) = steps.get_mut(column / COLUMNS..column / COLUMNS + 2) {
+            (*here, *next) = (*here + by * (COLUMNS as i32 - within), *next + by * within);
+        }
+    };
+    let (mut faces, mut at, mut begin) = (0, 0, 0);
+    while at < list.len() {
+        let (from, column, before) = (at, list[at] >> COLUMN, faces);
+        while at < list.len() && list[at] >> COLUMN == column {
+            faces += change(list[at]);
+            at += 1;
+        }
         let enters = faces > 0;
-        if enters != (before > 0) {
-            // Of those in one place, the first that goes the way of all.
-            let edge = here.clone().find(|key| (change(key) > 0) == enters).unwrap_or(next);
-            let edge = (edge >> FACES_BITS) as u32;
-            crossings.push(Crossing { row, column: column as u32, edge, enters });
-            match enters {
-                true => begin = column as usize,
-                false => add_between(counts, begin, column as usize),
-            }
+        if enters == (before > 0) {
+            continue;
         }
-        rest = &rest[here.count()..];
+        // Of those in one place, the first that goes the way of all.
+        let here = &list[from..at];
+        let edge = here.iter().find(|key| (change(**key) > 0) == enters).unwrap_or(&here[0]);
+        let edge = (edge >> FACES_BITS) as u32;
+        crossings.push(Crossing { row, column: column as u32, edge, enters });
+        begin = column as usize;
+        step(begin, if enters { 1 } else { -1 });
     }
-}
-
-/// Adds the samples between two columns to those of their pixels.
-#[inline(always)]
-fn add_between(counts: &mut [u16], begin: usize, end: usize) {
-    if begin >= end {
-        return;
-    }
-    let (from, to) = (begin / COLUMNS, (end - 1) / COLUMNS);
-    if let Some(counts) = counts.get_mut(from..=to) {
-        counts.iter_mut().for_each(|count| *count += COLUMNS as u16);
-        let within = [begin % COLUMNS, (to + 1) * COLUMNS - end];
-        for (at, less) in [0, to - from].into_iter().zip(within) {
-            counts[at] -= less as u16;
-        }
+    // What is not left covers nothing.
+    if faces > 0 {
+        step(begin, -1);
     }
 }
 

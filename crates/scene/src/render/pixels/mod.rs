@@ -1,6 +1,7 @@
 //! From triangles to pixels: projection, coverage, depth, shading.
 
 pub(in crate::render) mod area;
+pub(in crate::render) mod body_outline;
 pub(in crate::render) mod candidates;
 pub(in crate::render) mod coverage;
 pub(in crate::render) mod fractions;

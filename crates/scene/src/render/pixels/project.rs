@@ -51,6 +51,14 @@ impl Lens {
         Point { x: self.cx + k * p.x, y: self.cy - k * p.y, nearness }
     }
 
+    /// The place and nearness of a point to the right and up at a depth beyond the near plane.
+    #[inline(always)]
+    fn at<const PINHOLE: bool>(&self, x: f64, y: f64, depth: f64) -> ([f64; 2], f64) {
+        let near = if PINHOLE { 1.0 / depth } else { -depth };
+        let scale = if PINHOLE { self.scale * near } else { self.scale };
+        ([self.cx + scale * x, self.cy - scale * y], near)
+    }
+
     /// Depth from nearness.
     #[inline(always)]
     pub fn depth(&self, nearness: f64) -> f64 {
@@ -248,18 +256,7 @@ impl Projected {
             .zip(groups(&mut self.places[first..]));
         let vectors = Groups::new(positions);
         for (group, (((x, y), nearness), places)) in vectors.iter().zip(lists) {
-            let [px, py, pz] = coordinates(group);
-            let [mut cx, mut cy, mut depth] = [[0.0; LANES]; 3];
-            let mut inside = true;
-            for i in 0..LANES {
-                let [vx, vy, vz] = rows.map(|[a, b, c, t]| px[i] * a + py[i] * b + pz[i] * c + t);
-                // Written so that it is false for NaN.
-                inside &= (vx.abs() < HUGE)
-                    & (vy.abs() < HUGE)
-                    & (vz.abs() < HUGE)
-                    & (-vz >= Camera::NEAR);
-                (cx[i], cy[i], depth[i]) = (vx, vy, -vz);
-            }
+            let ([cx, cy, depth], inside) = in_camera(group, &rows);
             if !inside {
                 extents.whole = false;
                 for i in 0..LANES {
@@ -272,9 +269,7 @@ impl Projected {
             }
             let [mut u, mut v] = [[0.0f32; LANES]; 2];
             for i in 0..LANES {
-                let near = if PINHOLE { 1.0 / depth[i] } else { -depth[i] };
-                let scale = if PINHOLE { lens.scale * near } else { lens.scale };
-                let at = [lens.cx + scale * cx[i], lens.cy - scale * cy[i]];
+                let (at, near) = lens.at::<PINHOLE>(cx[i], cy[i], depth[i]);
                 (x[i], y[i], nearness[i]) = (at[0] as f32, at[1] as f32, near as f32);
                 (u[i], v[i]) = (rounded(at[0]), rounded(at[1]));
             }
@@ -288,6 +283,57 @@ impl Projected {
         }
         extents
     }
+}
+
+/// Finds the places of vertices in the picture, to the bits that [`Projected`] has. False if some
+/// are not usable or not beyond the near plane; then the places are not known.
+#[inline(always)]
+pub(in crate::render) fn places_of(
+    positions: &[Vec3],
+    placement: &Placement,
+    lens: &Lens,
+    out: &mut [[f32; 2]],
+) -> bool {
+    match lens.pinhole {
+        true => write_places::<true>(positions, placement, lens, out),
+        false => write_places::<false>(positions, placement, lens, out),
+    }
+}
+
+#[inline(always)]
+fn write_places<const PINHOLE: bool>(
+    positions: &[Vec3],
+    placement: &Placement,
+    lens: &Lens,
+    out: &mut [[f32; 2]],
+) -> bool {
+    let (rows, lens, mut whole) = (placement.rows(), *lens, true);
+    for (group, out) in Groups::new(positions).iter().zip(out.chunks_mut(LANES)) {
+        let ([cx, cy, depth], inside) = in_camera(group, &rows);
+        whole &= inside;
+        let mut places = [[0.0; 2]; LANES];
+        for i in 0..LANES {
+            places[i] = lens.at::<PINHOLE>(cx[i], cy[i], depth[i]).0.map(|v| v as f32);
+        }
+        out.copy_from_slice(&places[..out.len()]);
+    }
+    whole
+}
+
+/// Vertices to the right, up and away from the camera, and whether all are usable and beyond the
+/// near plane.
+#[inline(always)]
+fn in_camera(group: &[Vec3; LANES], rows: &[[f64; 4]; 3]) -> ([[f64; LANES]; 3], bool) {
+    let [px, py, pz] = coordinates(group);
+    let [mut cx, mut cy, mut depth] = [[0.0; LANES]; 3];
+    let mut inside = true;
+    for i in 0..LANES {
+        let [vx, vy, vz] = rows.map(|[a, b, c, t]| px[i] * a + py[i] * b + pz[i] * c + t);
+        // Written so that it is false for NaN.
+        inside &= (vx.abs() < HUGE) & (vy.abs() < HUGE) & (vz.abs() < HUGE) & (-vz >= Camera::NEAR);
+        (cx[i], cy[i], depth[i]) = (vx, vy, -vz);
+    }
+    ([cx, cy, depth], inside)
 }
 
 /// A list in groups of [`LANES`], without the incomplete last one.
