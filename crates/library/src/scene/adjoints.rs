@@ -76,6 +76,8 @@ fn part(by: &Adjoint, i: usize) -> &Adjoint {
 fn vertices(by: &Adjoint) -> ByVertex {
     match by {
         Adjoint::Points(all) => all.iter().map(|(v, by)| (*v, DVec3::from_array(*by))).collect(),
+        // Those of all vertices, from a host.
+        Adjoint::Array(gs) => (0..).zip(gs.chunks_exact(3).map(DVec3::from_slice)).collect(),
         _ => ByVertex::new(),
     }
 }
