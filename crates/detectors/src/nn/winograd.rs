@@ -14,7 +14,7 @@ const SIDE: usize = 6;
 const STEP: usize = 4;
 /// The number of products of a tile: its pixels.
 const PLACES: usize = SIDE * SIDE;
-/// The least number of tiles for which weights are prepared, if there are so many.
+/// The least number of tiles for which weights are prepared.
 const TILES: usize = 48;
 const NONE: Lanes = [0.0; WIDE];
 

@@ -53,7 +53,7 @@ infer { repeat 100 { delayed(mh(@x), at = @y); collect x; } }",
 )
 .of_reversible("delayed(drift(@x), @obs)");
 
-/// One step of so many may change which choices and observations there are.
+/// Of this many steps one may change which choices and observations there are.
 const STRUCTURAL: u64 = 16;
 
 /// Two-stage acceptance with a reversible inner kernel.
