@@ -367,8 +367,9 @@ pub fn decide(trace: &mut Trace, log_ratio: f64, rng: &mut Stream) -> Outcome {
 
 /// Accepts or rejects the pending proposal; where observations wait, one that passes is tested
 /// once more by the ratio of each stage, which is tempered. The product of the probabilities is
-/// balanced as the one test of the whole ratio is (Banterle, Grazian, Lee and Robert 2019, "Accelerating
-/// Metropolis-Hastings algorithms by delayed acceptance", Foundations of Data Science 1).
+/// balanced as the one test of the whole ratio is (Banterle, Grazian, Lee and Robert 2019,
+/// "Accelerating Metropolis-Hastings algorithms by delayed acceptance", Foundations of Data
+/// Science 1).
 ///
 /// # Errors
 /// If the program fails as the observations are evaluated, other than where it is undefined.

@@ -3,7 +3,7 @@
 //!
 //! Observations that wait keep their score, so that the weight of a stage is that of everything
 //! evaluated so far. Which ones wait depends on the program and on which observations both states
-//! have, so it is the same for a move and its reverse.
+//! have, so it is the same for a move and its reverse. Observations that appear run at once.
 
 use super::graph::Graph;
 use super::select::Selector;

@@ -1,4 +1,4 @@
-//! `delayed(move, at)`: delayed acceptance (Christen & Fox 2005) in the form of surrogate
+//! `delayed(move, at, then)`: delayed acceptance (Christen & Fox 2005) in the form of surrogate
 //! transitions (Liu 2001, section 9.4.3).
 //!
 //! Beside the chain's trace there is a second one, in which the coarse surrogates of the

@@ -38,7 +38,7 @@ impl Graph {
             self.run_effects(code)?;
             // A stale choice may acquire what another node released, so stale choices run
             // before the sweep, except those that are to be swept themselves. So may an
-            // observation that waits: nothing is swept before the second stage.
+            // observation that waits: nothing is swept before the last stage.
             let waits = !self.update.waiting.is_empty();
             if waits || self.update.unheld.is_empty() && self.update.idle.is_empty() {
                 let Some(n) = self.update.stale_choices.pop() else { break };
