@@ -13,12 +13,15 @@
 //! about 0.
 
 mod background;
+mod places;
 
 use self::background::scores;
+use self::places::{AT_A_TIME, Places};
 use super::elements::{CHANNELS, Edge, Edges, channels_of, turn_between};
 use super::elements::{ComparatorError, PER_RADIAN, check};
 use super::pictures::contour_map::ContourMap;
 use crate::contours::{ContourChange, ContourSlice};
+use pcadlang_numerics::num::simd::vectorised;
 use pcadlang_numerics::platform::threads::side_by_side;
 use rustc_hash::FxHashMap;
 use std::sync::Arc;
@@ -128,6 +131,18 @@ pub struct ContourRatio {
 /// Fixed-point steps per unit, for exact sums.
 const FIXED: f64 = (1u64 << 32) as f64;
 
+/// The greatest length of a piece that counts, in percent of the diagonal. No picture shows a
+/// longer one.
+const LONGEST: f64 = 1e3;
+
+/// Rounds to fixed point what one piece of at most [`LONGEST`] gives.
+#[inline(always)]
+fn fixed(v: f64) -> i64 {
+    // In a sum with 1.5 * 2^52 the unit is the last bit.
+    const SHIFT: f64 = 6_755_399_441_055_744.0;
+    (v * FIXED + SHIFT).to_bits() as i64 - SHIFT.to_bits() as i64
+}
+
 impl ContourRatio {
     /// Prepares the observed contours for frames of `width` x `height` pixels. With no
     /// observed contours every piece scores ln(1 - foreground).
@@ -220,35 +235,60 @@ impl ContourRatio {
 
     /// Adds (`sign` 1) or subtracts (-1) the contributions of elements.
     fn count(&self, elements: &ContourSlice<'_>, sign: i64, scratch: &mut Scratch) {
+        vectorised(
+            #[inline(always)]
+            || {
+                let mut places = Places::default();
+                let mut first = 0;
+                while first < elements.len() {
+                    places.set(&self.grid, elements, first);
+                    self.count_placed(&places, sign, scratch);
+                    first += AT_A_TIME;
+                }
+            },
+        );
+    }
+
+    #[inline(always)]
+    fn count_placed(&self, places: &Places, sign: i64, scratch: &mut Scratch) {
         let samples = self.grid.width as usize * self.grid.height as usize;
+        let [right, below] = self.grid.steps();
         // Integer sums are exact: a sum of individually rounded terms does not depend on
         // their order. A term is what one element gives to a group, or to none.
         let (mut total, mut length) = (scratch.total, scratch.length);
-        for e in elements.in_view() {
-            let weight = (f64::from(e.length * e.weight) * self.percent).min(1e4);
-            length = length.saturating_add(sign * (weight * FIXED) as i64);
-            let (low, high, f) = channels_of(e.tx, e.ty);
-            let corners = self.grid.corners(e.x, e.y);
-            let cells = [low, high].map(|k| {
-                let channel = self.cells.get(k * samples..(k + 1) * samples).unwrap_or_default();
-                corners.at.map(|at| channel.get(at).copied().unwrap_or(Cell::NOTHING))
-            });
-            let group = cells[0][0].group;
-            let alike = cells.iter().flatten().fold(true, |alike, c| alike & (c.group == group));
-            // Nearly everywhere they are.
-            let unmatched = if !alike {
-                scratch.share(cells, [1.0 - f, f], corners.weights(), weight, sign)
+        for i in 0..AT_A_TIME {
+            if places.length[i] <= 0.0 {
+                continue;
+            }
+            let weight = (f64::from(places.length[i]) * self.percent).min(LONGEST);
+            length = length.saturating_add(sign * fixed(weight));
+            let low = places.channel[i] as usize;
+            let high = if low + 1 < CHANNELS { low + 1 } else { 0 };
+            let mut cells = [Cell::NOTHING; 8];
+            for (cells, k) in cells.chunks_exact_mut(4).zip([low, high]) {
+                let first = k * samples + places.first[i] as usize;
+                let around = [first, first + right, first + below, first + below + right];
+                for (cell, at) in cells.iter_mut().zip(around) {
+                    *cell = self.cells.get(at).copied().unwrap_or(Cell::NOTHING);
+                }
+            }
+            let group = cells[0].group;
+            let other = cells.iter().fold(0, |other, c| other | (c.group ^ group));
+            let shares = places.shares(i);
+            // Nearly everywhere they are of one group.
+            let unmatched = if other != 0 {
+                scratch.share(&cells, &shares, weight, sign)
             } else {
-                let [a, b] = cells.map(|cells| corners.between(cells.map(|c| c.score)));
-                let score = weight * f64::from(a + f * (b - a));
+                let score = cells.iter().zip(&shares).fold(0.0, |sum, (c, s)| sum + c.score * s);
+                let score = sign * fixed(weight * f64::from(score));
                 if group == NO_GROUP {
                     score
                 } else {
-                    scratch.assign(group, [weight, score], sign);
-                    0.0
+                    scratch.assign(group, [sign * fixed(weight), score]);
+                    0
                 }
             };
-            total = total.saturating_add(sign * (unmatched * FIXED) as i64);
+            total = total.saturating_add(unmatched);
         }
         (scratch.total, scratch.length) = (total, length);
     }
@@ -282,7 +322,7 @@ impl ContourRatio {
         let factor = self.options.weight / self.options.unit;
         let length: f64 = elements
             .in_view()
-            .map(|e| (f64::from(e.length * e.weight) * self.percent).min(1e4))
+            .map(|e| (f64::from(e.length * e.weight) * self.percent).min(LONGEST))
             .sum();
         // With too little contour in view, each unit of length reduces the penalty.
         let missing = if length < self.options.least {
@@ -430,10 +470,10 @@ impl Scratch {
         (self.matched, self.total, self.length, self.of) = (0, 0, 0, None);
     }
 
-    /// Adds (`sign` 1) or removes (-1) an assignment: a length of contour in percent and
-    /// its unscaled score (length times log ratio). A group that does not exist takes none.
-    #[inline]
-    pub(super) fn assign(&mut self, group: u32, [length, score]: [f64; 2], sign: i64) {
+    /// Adds an assignment: a length of contour in percent and its unscaled score (length times
+    /// log ratio), both in fixed point.
+    #[inline(always)]
+    pub(super) fn assign(&mut self, group: u32, [length, score]: [i64; 2]) {
         if let Some(assign) = self.assignments.get_mut(group as usize) {
             if !assign.open {
                 if self.marked {
@@ -446,38 +486,35 @@ impl Scratch {
                     self.known.push(group);
                 }
             }
-            assign.length = assign.length.saturating_add(sign * ((length * FIXED) as i64).max(1));
-            assign.score = assign.score.saturating_add(sign * (score * FIXED) as i64);
+            assign.length = assign.length.saturating_add(length);
+            assign.score = assign.score.saturating_add(score);
         }
     }
 
-    /// Assigns a length of contour to the groups of the cells around it, by their shares in two
-    /// channels. Returns the score of what belongs to no group.
-    fn share(
-        &mut self,
-        cells: [[Cell; 4]; 2],
-        parts: [f32; 2],
-        shares: [f32; 4],
-        whole: f64,
-        sign: i64,
-    ) -> f64 {
+    /// Assigns a length of contour to the groups of the cells around it, by their shares.
+    /// Returns the score of what belongs to no group.
+    #[inline(always)]
+    fn share(&mut self, cells: &[Cell; 8], shares: &[f32; 8], whole: f64, sign: i64) -> i64 {
+        let (mut lengths, mut scores) = ([0; 8], [0; 8]);
+        for i in 0..8 {
+            let length = whole * f64::from(shares[i]);
+            lengths[i] = sign * fixed(length);
+            scores[i] = sign * fixed(length * f64::from(cells[i].score));
+        }
         // Neighbouring samples mostly belong to one group.
-        let (mut unmatched, mut group, mut given) = (0.0, NO_GROUP, [0.0; 2]);
-        for (cells, part) in cells.iter().zip(parts) {
-            for (cell, share) in cells.iter().zip(shares) {
-                let length = whole * f64::from(part * share);
-                let score = length * f64::from(cell.score);
-                if cell.group == NO_GROUP {
-                    unmatched += score;
-                } else if cell.group == group {
-                    given = [given[0] + length, given[1] + score];
-                } else {
-                    self.assign(group, given, sign);
-                    (group, given) = (cell.group, [length, score]);
-                }
+        let (mut unmatched, mut group, mut given) = (0, NO_GROUP, [0; 2]);
+        for i in 0..8 {
+            if cells[i].group != group {
+                self.assign(group, given);
+                (group, given) = (cells[i].group, [0; 2]);
+            }
+            if group == NO_GROUP {
+                unmatched += scores[i];
+            } else {
+                given = [given[0] + lengths[i], given[1] + scores[i]];
             }
         }
-        self.assign(group, given, sign);
+        self.assign(group, given);
         unmatched
     }
 

@@ -44,14 +44,22 @@ impl ContourSlice<'_> {
     /// view.
     #[inline(always)]
     pub(super) fn in_view(&self) -> impl Iterator<Item = Element> {
-        let (w, h) = (self.width as f32, self.height as f32);
         let lists =
             self.x.iter().zip(self.y).zip(self.tx.iter().zip(self.ty)).zip(self.length).enumerate();
         lists.filter_map(move |(index, (((&x, &y), (&tx, &ty)), &length))| {
-            let sound = (x + y + tx + ty + length).is_finite() && length > 0.0;
-            let weight = (x.min(w - x).min(y).min(h - y) + 0.5).clamp(0.0, 1.0);
-            (sound && weight > 0.0).then_some(Element { x, y, tx, ty, length, weight, index })
+            let weight = self.weight([x, y], [tx, ty], length);
+            (weight > 0.0).then_some(Element { x, y, tx, ty, length, weight, index })
         })
+    }
+
+    /// Returns the weight of an element: see [`Element`]. It is 0 if a number is not finite or
+    /// the length not positive.
+    #[inline(always)]
+    pub(super) fn weight(&self, [x, y]: [f32; 2], [tx, ty]: [f32; 2], length: f32) -> f32 {
+        let (w, h) = (self.width as f32, self.height as f32);
+        let sound = (x + y + tx + ty + length).is_finite() & (length > 0.0);
+        let weight = (x.min(w - x).min(y).min(h - y) + 0.5).clamp(0.0, 1.0);
+        if sound { weight } else { 0.0 }
     }
 }
 
@@ -225,18 +233,27 @@ impl Edges {
     /// Returns the grid samples around a point of the frame.
     #[inline(always)]
     pub fn corners(&self, x: f32, y: f32) -> Corners {
-        let (w, h) = (self.width as usize, self.height as usize);
+        let (first, fx, fy) = self.place(x, y);
+        let (first, [right, below]) = (first as usize, self.steps());
+        Corners { at: [first, first + right, first + below, first + below + right], fx, fy }
+    }
+
+    /// Returns the sample above and to the left of a point of the frame, and the fractions to
+    /// the right and down.
+    #[inline(always)]
+    pub fn place(&self, x: f32, y: f32) -> (i32, f32, f32) {
+        let (w, h) = (self.width as i32, self.height as i32);
         let gx = (x * self.sx - 0.5).clamp(0.0, (w - 1) as f32);
         let gy = (y * self.sy - 0.5).clamp(0.0, (h - 1) as f32);
-        // Via a 32-bit integer, which takes one instruction.
-        let whole = |v: f32| v as i32 as usize;
-        let (x0, y0) = (whole(gx).min(w.saturating_sub(2)), whole(gy).min(h.saturating_sub(2)));
-        let (x1, y1) = ((x0 + 1).min(w - 1), (y0 + 1).min(h - 1));
-        Corners {
-            at: [y0 * w + x0, y0 * w + x1, y1 * w + x0, y1 * w + x1],
-            fx: gx - x0 as f32,
-            fy: gy - y0 as f32,
-        }
+        let (x0, y0) = ((gx as i32).min((w - 2).max(0)), (gy as i32).min((h - 2).max(0)));
+        (y0 * w + x0, gx - x0 as f32, gy - y0 as f32)
+    }
+
+    /// Returns how many samples further on the next ones to the right and down are.
+    #[inline(always)]
+    pub fn steps(&self) -> [usize; 2] {
+        let (w, h) = (self.width as usize, self.height as usize);
+        [usize::from(w > 1), if h > 1 { w } else { 0 }]
     }
 }
 
@@ -252,20 +269,6 @@ pub(super) struct Corners {
 }
 
 impl Corners {
-    /// The bilinear weights.
-    #[inline]
-    pub fn weights(&self) -> [f32; 4] {
-        let (fx, fy) = (self.fx, self.fy);
-        [(1.0 - fx) * (1.0 - fy), fx * (1.0 - fy), (1.0 - fx) * fy, fx * fy]
-    }
-
-    /// Interpolates between the values of the four samples.
-    #[inline(always)]
-    pub fn between(&self, [a, b, c, d]: [f32; 4]) -> f32 {
-        let (top, bottom) = (a + self.fx * (b - a), c + self.fx * (d - c));
-        top + self.fy * (bottom - top)
-    }
-
     /// Returns the interpolated value, and its derivatives per grid unit.
     #[inline(always)]
     pub fn read(&self, field: &[f32]) -> (f32, f32, f32) {
@@ -277,11 +280,29 @@ impl Corners {
 }
 
 /// Returns the orientation of a tangent in channels: the angle modulo PI, times 8 / PI,
-/// within 0..8.
+/// within 0..8. The arctangent is Abramowitz & Stegun 1964, 4.4.49 (error 2e-8): it has no
+/// branches, so loops with it are vectorised.
+#[inline(always)]
 pub(super) fn channel(tx: f32, ty: f32) -> f32 {
-    let k = libm::atan2f(ty, tx) * PER_RADIAN;
-    let k = if k < 0.0 { k + CHANNELS as f32 } else { k };
-    if k >= CHANNELS as f32 { k - CHANNELS as f32 } else { k }
+    let (x, y) = (tx.abs(), ty.abs());
+    let (less, more) = if y > x { (x, y) } else { (y, x) };
+    let t = if more > 0.0 { less / more } else { 0.0 };
+    let s = t * t;
+    let series = [
+        -0.016_165_737,
+        0.042_909_61,
+        -0.075_289_64,
+        0.106_562_64,
+        -0.142_088_99,
+        0.199_935_51,
+        -0.333_331_45,
+        1.0,
+    ];
+    let angle = t * series.iter().fold(0.002_866_225_7, |sum, c| sum * s + c);
+    let k = angle * PER_RADIAN;
+    let k = if y > x { 0.5 * CHANNELS as f32 - k } else { k };
+    let k = if (tx < 0.0) != (ty < 0.0) { CHANNELS as f32 - k } else { k };
+    if k < CHANNELS as f32 { k } else { 0.0 }
 }
 
 /// Returns the smaller difference of two orientations in channels, 0..=4.

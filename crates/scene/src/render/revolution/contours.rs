@@ -16,8 +16,8 @@ use std::cell::RefCell;
 struct Scratch {
     samples: Samples,
     spans: Spans,
-    /// The number of visible pieces the last time.
-    found: usize,
+    /// Visible pieces, and room for more.
+    out: Contours,
 }
 
 thread_local! {
@@ -44,14 +44,13 @@ impl Contours {
 impl Scratch {
     fn contours(&mut self, surface: &Revolution, sight: &Sight, camera: &Camera) -> Contours {
         let range = sight.range(surface);
-        let out = Contours::with_room(camera, self.found);
         if !(range.far > Camera::NEAR && range.far < HUGE) {
-            return out;
+            return Contours::new(camera.width, camera.height);
         }
         let whole = range.near > Camera::NEAR;
         let extent = range.far - range.near.max(Camera::NEAR);
-        let Scratch { samples, spans, found } = self;
-        let out = vectorised(
+        let Scratch { samples, spans, out } = self;
+        vectorised(
             #[inline(always)]
             move || {
                 samples.clear();
@@ -78,11 +77,9 @@ impl Scratch {
                 };
                 drawer.silhouettes();
                 drawer.rims();
-                drawer.pieces()
+                drawer.pieces(camera)
             },
-        );
-        *found = out.len();
-        out
+        )
     }
 }
 

@@ -15,6 +15,7 @@ use crate::render::lines::extraction::clip;
 use crate::render::lines::visibility::{BESIDE, LONGEST, SILHOUETTE_SLACK, TOLERANCE};
 use crate::render::pixels::place::Point;
 use crate::render::pixels::project::beyond_near;
+use crate::render::simd::vectorised;
 use glam::DVec3;
 
 /// Draws the contours of a surface from samples of its curves.
@@ -33,7 +34,7 @@ pub(super) struct Drawer<'a> {
     pub size: [f64; 2],
     /// The number of pieces in `out`, whose lists are longer.
     pub count: usize,
-    pub out: Contours,
+    pub out: &'a mut Contours,
 }
 
 /// Pieces to be tested for visibility: middle, depth, unit tangent, and how much nearer
@@ -194,12 +195,16 @@ impl Drawer<'_> {
                 self.add(far, &visible);
             }
         }
+        let mut parts = Parts::default();
         for (side, chords) in sides.iter().enumerate() {
             for i in 0..LANES {
                 if cut[i] & chords.there[i] != 0 {
-                    self.cut(first, chords, i, side, both, smooth);
+                    self.cut(&mut parts, (first, side, i), chords, both, smooth);
                 }
             }
+        }
+        if parts.count > 0 {
+            self.add_parts(&mut parts, both);
         }
     }
 
@@ -322,7 +327,7 @@ impl Drawer<'_> {
             self.grow();
         }
         let at = self.count;
-        let Contours { x, y, tx, ty, length, .. } = &mut self.out;
+        let Contours { x, y, tx, ty, length, .. } = &mut *self.out;
         put(x, at, rows[0]);
         put(y, at, rows[1]);
         put(tx, at, rows[2]);
@@ -334,25 +339,26 @@ impl Drawer<'_> {
     #[inline(never)]
     fn grow(&mut self) {
         let needed = 2 * self.count + 2 * self.samples.count + LANES;
-        let Contours { x, y, tx, ty, length, .. } = &mut self.out;
+        let Contours { x, y, tx, ty, length, .. } = &mut *self.out;
         [x, y, tx, ty, length].into_iter().for_each(|list| list.resize(needed, 0.0));
     }
 
     /// The pieces found.
-    pub fn pieces(mut self) -> Contours {
-        let Contours { x, y, tx, ty, length, .. } = &mut self.out;
-        [x, y, tx, ty, length].into_iter().for_each(|list| list.truncate(self.count));
-        self.out
+    pub fn pieces(self, camera: &Camera) -> Contours {
+        let Contours { x, y, tx, ty, length, .. } = &*self.out;
+        let [x, y, tx, ty, length] =
+            [x, y, tx, ty, length].map(|list| list.get(..self.count).unwrap_or(list).to_vec());
+        Contours { x, y, tx, ty, length, width: camera.width, height: camera.height }
     }
 
-    /// Adds the visible pieces of a chord that is long or leaves the image.
+    /// Divides a chord that is long or leaves the image, and adds the visible pieces once there
+    /// are enough to test. `first`, `side` and `i` say which chord it is.
     #[inline(never)]
     fn cut(
         &mut self,
-        first: usize,
+        parts: &mut Parts,
+        (first, side, i): (usize, usize, usize),
         chords: &Chords,
-        i: usize,
-        side: usize,
         both: bool,
         smooth: bool,
     ) {
@@ -381,18 +387,50 @@ impl Drawer<'_> {
             let t = t0 + step * (k as f64 + 0.5);
             let at = [a.x + dx * t, a.y + dy * t];
             let depth = self.sight.lens.depth(a.nearness + (b.nearness - a.nearness) * t);
-            let mut piece = Pieces::default();
-            for axis in 0..2 {
-                (piece.at[axis][0], piece.tangent[axis][0]) = (at[axis], tangent[axis]);
-                piece.slack[axis][0] = slack[axis];
+            parts.add(at, tangent, slack, depth, length / count);
+            if parts.count == LANES {
+                self.add_parts(parts, both);
             }
-            (piece.depth[0], piece.there[0]) = (depth, mask(depth.is_finite()));
-            if self.visible(&piece, both)[0] != 0 {
-                let values = [at[0], at[1], tangent[0], tangent[1], length / count];
+        }
+    }
+
+    /// Adds the visible ones of some pieces, and forgets all.
+    fn add_parts(&mut self, parts: &mut Parts, both: bool) {
+        let visible = vectorised(
+            #[inline(always)]
+            || self.visible(&parts.pieces, both),
+        );
+        let Pieces { at, tangent, .. } = &parts.pieces;
+        for (i, visible) in visible.iter().enumerate() {
+            if *visible != 0 {
+                let values = [at[0][i], at[1][i], tangent[0][i], tangent[1][i], parts.length[i]];
                 let rows = values.map(|v| [v as f32; LANES]);
                 self.write(rows.each_ref(), 1);
             }
         }
+        *parts = Parts::default();
+    }
+}
+
+/// Pieces of divided chords.
+#[derive(Default)]
+struct Parts {
+    pieces: Pieces,
+    length: Row,
+    count: usize,
+}
+
+impl Parts {
+    /// Adds a piece, for which there is room.
+    fn add(&mut self, at: [f64; 2], tangent: [f64; 2], slack: [f64; 2], depth: f64, length: f64) {
+        let (i, pieces) = (self.count % LANES, &mut self.pieces);
+        for axis in 0..2 {
+            (pieces.at[axis][i], pieces.tangent[axis][i]) = (at[axis], tangent[axis]);
+            pieces.slack[axis][i] = slack[axis];
+        }
+        (pieces.depth[i], pieces.there[i]) = (depth, mask(depth.is_finite()));
+        self.length[i] = length;
+        self.count += 1;
     }
 }
 

@@ -4,7 +4,7 @@
 //! depth, and the squared radius of a cone at the line's height another; whether their
 //! difference has a root in an interval is decided without a square root.
 
-use super::lanes::{LANES, Mask, Row, mask};
+use super::lanes::{LANES, Mask, Row, any, mask};
 use super::sight::Rays;
 use crate::geom::{Revolution, Ring};
 use crate::render::Camera;
@@ -103,10 +103,21 @@ impl Spans {
                 met[i] |= mask(between & on);
             }
         }
+        let mut open = [0; LANES];
+        for i in 0..LANES {
+            open[i] = mask(near[i] < far[i]);
+        }
         for cone in &self.cones {
             let [from, to] = cone.ends;
             if !cone.between(low, high) {
                 continue;
+            }
+            let mut left = [0; LANES];
+            for i in 0..LANES {
+                left[i] = open[i] & !met[i];
+            }
+            if !any(&left) {
+                break;
             }
             for i in 0..LANES {
                 let s = clamp((from - at[i]) * per[i], near[i], far[i]);
@@ -119,8 +130,7 @@ impl Spans {
                 // A change of sign, or an extremum in between on the other side of 0.
                 let apart = e * f < 0.0;
                 let between = (u * v < 0.0) & (e * a2 > 0.0) & (c0 * a2 < b1 * b1);
-                let some = (near[i] < far[i]) & (s != t);
-                met[i] |= mask(some & (apart | between));
+                met[i] |= mask((s != t) & (apart | between)) & open[i];
             }
         }
         met

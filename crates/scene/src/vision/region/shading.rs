@@ -42,6 +42,7 @@ pub(super) fn log_ratio(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32])
         || {
             // The pixels that count, side by side.
             let (mut block, mut count) = ([[0.0; BLOCK]; 4], 0);
+            let mut columns = [[[0.0; LANES]; ROWS]; ALL];
             let lists = groups.chunks(BLOCK).zip(normals.chunks(BLOCK));
             for ((groups, normals), brightness) in lists.zip(brightness.chunks(BLOCK)) {
                 // Most of a picture is background.
@@ -54,44 +55,56 @@ pub(super) fn log_ratio(groups: &[u8], normals: &[[f32; 3]], brightness: &[f32])
                     block[3][place] = *b;
                     count += usize::from(*g > 0 && (n[0] + n[1] + n[2] + b).is_finite());
                     if count == BLOCK {
-                        add(&mut sums, &block, BLOCK);
+                        add(&mut sums, &mut columns, &block, BLOCK);
                         count = 0;
                     }
                 }
             }
             block.iter_mut().for_each(|list| list[count..].fill(0.0));
-            add(&mut sums, &block, count);
+            add(&mut sums, &mut columns, &block, count);
         },
     );
     from_products(&sums.map(|row| row.map(|lanes| lanes.iter().sum())))
 }
 
-/// Number of pixels whose products are added at a time.
-const BLOCK: usize = 32;
 /// Number of independent partial sums. It is fixed, so that the result does not depend on the
 /// machine.
 const LANES: usize = 8;
+/// Number of pixels whose products are added at a time, in rows of [`LANES`].
+const BLOCK: usize = ROWS * LANES;
+const ROWS: usize = 4;
 
 /// Adds the products of (1, terms, brightness) of the first `count` of some pixels, only those on
-/// and above the diagonal. `block` has their normals and brightness, and zeros behind them.
+/// and above the diagonal. `block` has their normals and brightness, and zeros behind them;
+/// `columns` is room for the terms.
 #[inline(always)]
-fn add(sums: &mut [[[f64; LANES]; ALL]; ALL], block: &[[f32; BLOCK]; 4], count: usize) {
-    let mut columns = [[0.0; BLOCK]; ALL];
-    for i in 0..BLOCK {
-        let [x, y, z, brightness] = [0, 1, 2, 3].map(|k| f64::from(block[k][i]));
-        columns[0][i] = if i < count { 1.0 } else { 0.0 };
-        (columns[1][i], columns[2][i], columns[3][i]) = (x, y, z);
-        (columns[4][i], columns[5][i], columns[6][i]) = (x * y, x * z, y * z);
-        (columns[7][i], columns[8][i]) = (x * x - y * y, brightness);
+fn add(
+    sums: &mut [[[f64; LANES]; ALL]; ALL],
+    columns: &mut [[[f64; LANES]; ROWS]; ALL],
+    block: &[[f32; BLOCK]; 4],
+    count: usize,
+) {
+    for row in 0..ROWS {
+        for l in 0..LANES {
+            let i = row * LANES + l;
+            let [x, y, z, brightness] = [0, 1, 2, 3].map(|k| f64::from(block[k][i]));
+            let one = if i < count { 1.0 } else { 0.0 };
+            let terms = [one, x, y, z, x * y, x * z, y * z, x * x - y * y, brightness];
+            for (column, term) in columns.iter_mut().zip(terms) {
+                column[row][l] = term;
+            }
+        }
     }
     for i in 0..ALL {
         for j in i..ALL {
-            let lanes = &mut sums[i][j];
-            for at in (0..BLOCK).step_by(LANES) {
-                for (l, lane) in lanes.iter_mut().enumerate() {
-                    *lane += columns[i][at + l] * columns[j][at + l];
+            // A copy, which stays in registers.
+            let mut lanes = sums[i][j];
+            for (a, b) in columns[i].iter().zip(&columns[j]) {
+                for l in 0..LANES {
+                    lanes[l] += a[l] * b[l];
                 }
             }
+            sums[i][j] = lanes;
         }
     }
 }
