@@ -14,6 +14,8 @@ use crate::render::Camera;
 pub(super) struct Cone {
     /// Heights of the lower and the upper end.
     ends: [f64; 2],
+    /// The squared radius of a cylinder around it.
+    around: f64,
     /// Radius at height 0 of the cone, and its change per height.
     radius: f64,
     slope: f64,
@@ -48,8 +50,14 @@ impl Shape {
         let slope = (b.r - a.r) / (b.y - a.y);
         let radius = a.r - slope * a.y;
         let ends = if a.y < b.y { [a.y, b.y] } else { [b.y, a.y] };
-        Shape::Cone(Cone { ends, radius, slope, span })
+        Shape::Cone(Cone { ends, around: around(a.r.max(b.r)), radius, slope, span })
     }
+}
+
+/// The squared radius of a cylinder around circles of at most this radius.
+#[inline(always)]
+fn around(radius: f64) -> f64 {
+    radius * radius * (1.0 + 1e-9)
 }
 
 /// The spans of a surface.
@@ -72,7 +80,7 @@ impl Spans {
         self.levels.clear();
         let most =
             surface.rings().iter().fold(0.0f64, |m, ring| if ring.r > m { ring.r } else { m });
-        self.around = most * most * (1.0 + 1e-9);
+        self.around = around(most);
         for (span, ends) in (0u64..).zip(surface.spans().iter().map(|s| surface.ends(s))) {
             let Some(ends) = ends else { continue };
             match Shape::new(ends, span) {
@@ -93,6 +101,7 @@ impl Spans {
     pub fn meets(&self, rays: &Rays, [from, to]: [&Row; 2]) -> Mask {
         let Rays { square: [c, b, a], height: [at, climb] } = rays;
         let Inside { near, far, per, low, high } = self.inside(rays, [from, to]);
+        let least = nearest_to_axis(rays, &near, &far);
         let mut met = [0; LANES];
         for level in self.levels.iter().filter(|level| level.y >= low && level.y <= high) {
             for i in 0..LANES {
@@ -109,7 +118,7 @@ impl Spans {
         }
         for cone in &self.cones {
             let [from, to] = cone.ends;
-            if !cone.between(low, high) {
+            if !cone.between(low, high) | (cone.around < least) {
                 continue;
             }
             let mut left = [0; LANES];
@@ -135,6 +144,19 @@ impl Spans {
         }
         met
     }
+}
+
+/// The least squared distance from the axis of parts of lines of sight.
+#[inline(always)]
+fn nearest_to_axis(rays: &Rays, near: &Row, far: &Row) -> f64 {
+    let [c, b, a] = &rays.square;
+    let mut squares = [0.0; LANES];
+    for i in 0..LANES {
+        let depth = clamp(-b[i] / a[i], near[i], far[i]);
+        let square = c[i] + depth * (2.0 * b[i] + a[i] * depth);
+        squares[i] = if near[i] < far[i] { square } else { f64::INFINITY };
+    }
+    squares.iter().fold(f64::INFINITY, |least, square| least.min(*square)) * (1.0 - 1e-9)
 }
 
 /// The parts of lines of sight inside of a cylinder around the surface, as depths, the

@@ -11,7 +11,7 @@ use crate::geom::{Revolution, Ring};
 use crate::render::Camera;
 
 /// The distance between samples, in pixels.
-const STEP: f64 = 1.35;
+const STEP: f64 = 1.2;
 /// The maximum distance of a curve from the chords between its samples, in pixels.
 const STRAY: f64 = 0.02;
 /// The maximum number of chords of half a circle.
