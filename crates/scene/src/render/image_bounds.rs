@@ -18,6 +18,10 @@ impl View {
     /// revolution, as fractions of the picture's sides. Infinite if the solid extends behind
     /// the camera, or has no vertices.
     pub fn image_bounds(&self) -> [f64; 4] {
+        *self.bounds.get_or_init(|| self.find_bounds())
+    }
+
+    fn find_bounds(&self) -> Bounds {
         let camera = self.camera();
         let found = match self.solid().revolution() {
             Some(r) => around(r.surface.rings().iter().map(|ring| ring_box(r, ring, camera))),

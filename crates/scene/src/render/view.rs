@@ -51,6 +51,8 @@ pub struct View {
     read_before: Vec<(Channel, u32)>,
     /// By size, the coverage of the last view before it whose coverage was needed.
     covered_before: Vec<(u32, Arc<Fractions>)>,
+    /// See [`View::image_bounds`].
+    pub(super) bounds: OnceLock<[f64; 4]>,
 }
 
 impl View {
@@ -65,6 +67,7 @@ impl View {
             read: Mutex::default(),
             read_before: Vec::new(),
             covered_before: Vec::new(),
+            bounds: OnceLock::new(),
         }
     }
 

@@ -160,8 +160,12 @@ impl Factor {
 
 /// Returns the packed lower triangle of a square matrix.
 pub(in crate::dist) fn lower(m: &DMatrix<f64>) -> Option<Vec<f64>> {
-    let n = m.nrows();
-    (m.ncols() == n).then(|| (0..n).flat_map(|i| (0..=i).map(move |j| m[(i, j)])).collect())
+    let (n, by_columns) = (m.nrows(), m.as_slice());
+    let mut packed = Vec::with_capacity(row(n));
+    for i in 0..n {
+        packed.extend(by_columns.iter().skip(i).step_by(n).take(i + 1));
+    }
+    (m.ncols() == n).then_some(packed)
 }
 
 /// How many rows are factored together, so that their dot products with the same row run

@@ -63,10 +63,7 @@ fn around(radius: f64) -> f64 {
 /// The spans of a surface.
 #[derive(Debug, Default)]
 pub(super) struct Spans {
-    /// By the height of their lower end.
     cones: Vec<Cone>,
-    /// The same by the height of their upper end, from the top.
-    downwards: Vec<Cone>,
     levels: Vec<Level>,
     /// The squared radius of a cylinder around the surface.
     around: f64,
@@ -88,12 +85,6 @@ impl Spans {
                 Shape::Level(level) => self.levels.push(level),
             }
         }
-        self.downwards.clone_from(&self.cones);
-        let by = |end: usize| {
-            move |a: &Cone, b: &Cone| a.ends[end].total_cmp(&b.ends[end]).then(a.span.cmp(&b.span))
-        };
-        self.cones.sort_unstable_by(by(0));
-        self.downwards.sort_unstable_by(|a, b| by(1)(b, a));
     }
 
     /// True if each line of sight meets a span between two depths.
@@ -198,29 +189,13 @@ impl Spans {
     /// The first hit of each line of sight beyond the near plane.
     #[inline(always)]
     pub fn nearest(&self, rays: &Rays) -> FirstHits {
-        let Rays { height: [at, climb], .. } = rays;
-        let Inside { near, far, per, low, high } =
+        let Inside { near, far, low, high, .. } =
             self.inside(rays, [&[Camera::NEAR; LANES], &[f64::INFINITY; LANES]]);
         let mut seen = FirstHits::NOTHING;
         for level in self.levels.iter().filter(|level| level.y >= low && level.y <= high) {
             level.first(rays, &mut seen);
         }
-        // In the order in which lines that climb reach them, or those that descend; lines that
-        // differ need all.
-        let (up, down) =
-            climb.iter().fold((true, true), |(up, down), c| (up & (*c > 0.0), down & (*c < 0.0)));
-        let (cones, entry) = if down { (&self.downwards, 1) } else { (&self.cones, 0) };
-        for cone in cones.iter().filter(|cone| cone.between(low, high)) {
-            if up | down {
-                let mut open = false;
-                for i in 0..LANES {
-                    let reached = (cone.ends[entry] - at[i]) * per[i];
-                    open |= (near[i] <= far[i]) & (seen.depth[i] > reached);
-                }
-                if !open {
-                    break;
-                }
-            }
+        for cone in self.cones.iter().filter(|cone| cone.between(low, high)) {
             cone.first(rays, &mut seen);
         }
         for i in 0..LANES {
