@@ -102,7 +102,7 @@ fn rewrite(
     let path = dir.join(draws_name(chain));
     let layout = Layout::new(all, columns);
     let mut reader = DrawReader::new(BufReader::new(File::open(&path)?), all, u64::MAX);
-    let new = begin(dir, &draws_name(chain), |file| {
+    let new = begin(dir, &draws_name(chain), true, |file| {
         let mut out = BufWriter::new(file);
         out.write_all(head.as_bytes())?;
         let mut sink = CsvSink::bare(out);

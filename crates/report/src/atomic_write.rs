@@ -9,12 +9,13 @@ use std::path::{Path, PathBuf};
 const PARTIAL: &str = ".partial";
 
 /// Writes a file in a folder. If that fails, an older file of the same name is kept;
-/// otherwise the new file gets the permissions of the older one.
+/// otherwise the new file gets the permissions of the older one. Only with `lasting` it survives
+/// a power failure just after, for which the disk is waited for.
 ///
 /// # Errors
 /// Returns the error of the file system.
-pub fn write_atomically(folder: &Path, name: &str, bytes: &[u8]) -> io::Result<()> {
-    let partial = begin(folder, name, |f| f.write_all(bytes))?;
+pub fn write_atomically(folder: &Path, name: &str, bytes: &[u8], lasting: bool) -> io::Result<()> {
+    let partial = begin(folder, name, lasting, |f| f.write_all(bytes))?;
     partial.end().inspect_err(|_| {
         // Report the first error, not one of the clean-up.
         let _ = std::fs::remove_file(&partial.0);
@@ -32,13 +33,14 @@ pub(super) struct PartialFile(PathBuf, PathBuf);
 pub(super) fn begin(
     folder: &Path,
     name: &str,
+    lasting: bool,
     write: impl FnOnce(&mut File) -> io::Result<()>,
 ) -> io::Result<PartialFile> {
     let (path, partial) = (folder.join(name), folder.join(format!(".{name}{PARTIAL}")));
     let written = File::create(&partial).and_then(|mut f| {
         write(&mut f)?;
         // The final name must not reach the disk before the contents.
-        f.sync_data()
+        if lasting { f.sync_data() } else { Ok(()) }
     });
     match written {
         Ok(()) => Ok(PartialFile(partial, path)),
@@ -68,7 +70,7 @@ impl PartialFile {
 /// Returns an error if it cannot be written, or the path does not name a file.
 pub fn write_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let name = path.file_name().and_then(|n| n.to_str()).ok_or(io::ErrorKind::InvalidInput)?;
-    write_atomically(path.parent().unwrap_or(Path::new("")), name, bytes)
+    write_atomically(path.parent().unwrap_or(Path::new("")), name, bytes, true)
 }
 
 /// Returns whether a file is partially written, by the name that [`begin`] gives.

@@ -99,7 +99,7 @@ impl RunDir {
         }
         // If this is interrupted, the mark must not stand for a complete run.
         if names.contains(&MARK) {
-            write_atomically(path, MARK, CLEARED).map_err(io)?;
+            write_atomically(path, MARK, CLEARED, true).map_err(io)?;
         }
         for name in
             names.into_iter().filter(|n| is_partial(n) || is_numbered(n) || WRITTEN.contains(n))
@@ -150,13 +150,15 @@ impl RunDir {
         self.path.join(name)
     }
 
-    /// Writes a file under a temporary name first, so that readers never see half of it.
+    /// Writes a file under a temporary name first, so that readers never see half of it. What a
+    /// run is resumed from survives a power failure too.
     ///
     /// # Errors
     /// Returns an error if it cannot be written; an older file of the same name is then
     /// kept.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), RunDirError> {
-        write_atomically(&self.path, name, bytes)
+        let resumed = name == MARK || name == "program.pcad" || name.ends_with(".checkpoint");
+        write_atomically(&self.path, name, bytes, resumed)
             .map_err(|error| RunDirError::Io { path: self.file(name), error })
     }
 }
