@@ -3,7 +3,7 @@
 use clap::Args;
 use image::RgbImage;
 use pcadlang_detectors::boxes::sides;
-use pcadlang_detectors::objects::{self, FoundObject, ObjectOptions, View};
+use pcadlang_detectors::objects::{self, FoundObject, ObjectFinder, ObjectOptions, View};
 use pcadlang_detectors::people::{FindOptions, Person, Search, VIEWS_OF_PEOPLE, json};
 use pcadlang_report::pictures::{DETECTED, dots, limbs, picture_size, png};
 use pcadlang_runs::failure::{Failure, plain};
@@ -116,9 +116,7 @@ fn detect_people(a: &Detect, photo: &Photo) -> Result<(), Failure> {
     let wide = ObjectOptions { most: usize::MAX, ..ObjectOptions::default() };
     let objects = match a.bounds {
         Some(_) => Vec::new(),
-        None => {
-            objects::networks::finder().map_err(plain)?.find_in_views(photo, VIEWS_OF_PEOPLE, &wide)
-        }
+        None => objects_in(photo, VIEWS_OF_PEOPLE, &wide)?,
     };
     let within = a.bounds.map(|b| Search::Within(sides(b)));
     let search = within.unwrap_or(Search::Everywhere(&objects));
@@ -138,8 +136,7 @@ fn detect_people(a: &Detect, photo: &Photo) -> Result<(), Failure> {
 
 /// Detects the objects in a photograph, and lists them with the colours of their boxes.
 fn detect_objects(a: &Detect, photo: &Photo) -> Result<(), Failure> {
-    let finder = objects::networks::finder().map_err(plain)?;
-    let found = finder.find(photo, View::WHOLE, &ObjectOptions::default());
+    let found = objects_in(photo, &[View::WHOLE], &ObjectOptions::default())?;
     let file = objects::json::coco(&found, (photo.width(), photo.height()), &name(a), a.image_id);
     write(a, "objects.json", &format!("{file:#}\n"), || boxes(photo, &found))?;
     match found.len() {
@@ -157,6 +154,14 @@ fn detect_objects(a: &Detect, photo: &Photo) -> Result<(), Failure> {
         );
     }
     Ok(())
+}
+
+fn objects_in(
+    photo: &Photo,
+    views: &[View],
+    options: &ObjectOptions,
+) -> Result<Vec<FoundObject>, Failure> {
+    ObjectFinder::INCLUDED.find_in_views(photo, views, options).map_err(|e| plain(e.to_string()))
 }
 
 /// The photograph's name without its folder.

@@ -35,10 +35,9 @@ pub struct Strip {
     pub inside: Vec<f32>,
     /// The same of what they gain on a flat end.
     pub ends: Vec<f32>,
-    /// What a right side of each slope gains per row, by slope, row and column.
-    pub right: Vec<f32>,
-    /// What a left side gains, by slope and row, with the columns from right to left.
-    pub left: Vec<f32>,
+    /// What a side gains per row, by its slope to the right, row and column. That of a left side
+    /// is the reverse of the outline's.
+    pub sides: Vec<f32>,
 }
 
 /// An outline: half-widths from a first row on.
@@ -58,6 +57,9 @@ pub struct Table {
     best: Vec<f32>,
     /// What the last row allows to go on with, by slope and half-width.
     before: Vec<f32>,
+    /// What a row gains by half-width: as a flat end, inside, and as the end after it; and the
+    /// best score in it.
+    spans: [Vec<f32>; 4],
 }
 
 /// States per half-width: the slopes, and the beginning.
@@ -83,57 +85,52 @@ impl Strip {
         table.best.resize(self.rows * STATES * stride, NEVER);
         table.before.clear();
         table.before.resize(SLOPES * stride, NEVER);
+        table.spans.iter_mut().for_each(|s| s.resize(stride, NEVER));
         let (mut best, mut end) = (NEVER, (0, 0, 0));
         for t in 1..self.rows - 1 {
-            let (done, rest) = table.best.split_at_mut(t * STATES * stride);
+            let Table { best: scores, before, spans: [begin, inside, after, most] } = &mut *table;
+            let (done, rest) = scores.split_at_mut(t * STATES * stride);
             let row = &mut rest[..STATES * stride];
             vectorised(
                 #[inline(always)]
                 || {
                     if t > 1 {
-                        ways_on(
-                            &done[(t - 1) * STATES * stride..],
-                            stride,
-                            prices,
-                            &mut table.before,
-                        );
-                        self.continued(axis, t, stride, prices.slope, &table.before, row);
+                        ways_on(&done[(t - 1) * STATES * stride..], stride, prices, before);
+                        self.continued(axis, t, stride, prices.slope, before, row);
                     }
-                    self.begun(axis, t, stride, row);
+                    self.spans(&self.ends, axis, t, begin);
+                    self.spans(&self.inside, axis, t, inside);
+                    self.spans(&self.ends, axis, t + 1, after);
+                    row[SLOPES * stride..].copy_from_slice(begin);
+                    most.fill(NEVER);
+                    for scores in row.chunks_exact_mut(stride) {
+                        for ((score, inside), most) in scores.iter_mut().zip(&*inside).zip(&mut *most)
+                        {
+                            *score += inside;
+                            *most = most.max(*score);
+                        }
+                    }
+                    most.iter_mut().zip(&*after).for_each(|(most, after)| *most += after);
                 },
             );
-            for (state, scores) in row.chunks_exact(stride).enumerate() {
-                for w in LEAST..stride {
-                    let score = scores[w] + self.end(axis, t + 1, w);
-                    if score > best {
-                        (best, end) = (score, (t, state, w));
-                    }
-                }
+            let highest = most[LEAST..].iter().fold(NEVER, |a, b| a.max(*b));
+            if highest > best {
+                let is_highest = |i: &usize| row[*i] + after[i % stride] == highest;
+                let found = (0..row.len()).filter(|i| i % stride >= LEAST).find(is_highest);
+                (best, end) = (highest, found.map_or(end, |i| (t, i / stride, i % stride)));
             }
         }
         let (first, widths) = self.traced(end, stride, prices, &table.best);
         Some(Outline { score: best, first, widths })
     }
 
-    /// What a flat end just before or after an outline gains in a row.
+    /// Fills in for each half-width what a row gains, by its sums before each column.
     #[inline(always)]
-    fn end(&self, axis: usize, row: usize, w: usize) -> f32 {
-        let ends = &self.ends[row * (self.columns + 1)..];
-        ends[axis + w + 1] - ends[axis - w]
-    }
-
-    /// Fills in the scores of outlines that begin in a row, and adds to all what is inside
-    /// it.
-    #[inline(always)]
-    fn begun(&self, axis: usize, t: usize, stride: usize, row: &mut [f32]) {
-        for w in LEAST..stride {
-            row[SLOPES * stride + w] = self.end(axis, t, w);
-        }
-        let inside = &self.inside[t * (self.columns + 1)..];
-        for scores in row.chunks_exact_mut(stride) {
-            for w in LEAST..stride {
-                scores[w] += inside[axis + w + 1] - inside[axis - w];
-            }
+    fn spans(&self, sums: &[f32], axis: usize, row: usize, out: &mut [f32]) {
+        let sums = &sums[row * (self.columns + 1)..];
+        let (left, right) = (&sums[axis + 1 - out.len()..][..out.len()], &sums[axis + 1..]);
+        for ((out, left), right) in out.iter_mut().zip(left.iter().rev()).zip(right) {
+            *out = right - left;
         }
     }
 
@@ -156,14 +153,14 @@ impl Strip {
             let last = (stride as isize + slope.min(0)).max(first as isize) as usize;
             let from = (first as isize - slope) as usize;
             let middle = (2 * first as isize - slope).div_euclid(2) as usize;
-            let at = (m * self.rows + t) * self.columns;
             let count = last - first;
-            let right = &self.right[at + axis + middle..][..count];
-            let left = &self.left[at + self.columns - 1 - axis + middle..][..count];
+            let side = |m: usize| &self.sides[(m * self.rows + t) * self.columns..];
+            let right = &side(m)[axis + middle..][..count];
+            let left = &side(SLOPES - 1 - m)[axis + 1 - middle - count..][..count];
             let before = &before[m * stride + from..][..count];
             let scores = &mut row[m * stride + first..][..count];
             for i in 0..count {
-                scores[i] = before[i] + right[i] + left[i] - price;
+                scores[i] = before[i] + right[i] + left[count - 1 - i] - price;
             }
         }
     }
@@ -254,8 +251,7 @@ mod tests {
         let mut list =
             |n: usize, scale: f32| -> Vec<f32> { (0..n).map(|_| scale * (next() - 0.5)).collect() };
         let (inside, ends) = (list(ROWS * COLUMNS, 0.5), list(ROWS * COLUMNS, 1.0));
-        let right = list(SLOPES * ROWS * COLUMNS, 6.0);
-        let left = list(SLOPES * ROWS * COLUMNS, 6.0);
+        let sides = list(SLOPES * ROWS * COLUMNS, 6.0);
         let sums = |cells: &[f32]| -> Vec<f32> {
             let row = |row: &[f32]| -> Vec<f32> {
                 (0..=COLUMNS).map(|n| row[..n].iter().sum()).collect()
@@ -268,8 +264,7 @@ mod tests {
             columns: COLUMNS,
             inside: inside_sums,
             ends: ends_sums,
-            right,
-            left,
+            sides,
         };
         (strip, inside, ends)
     }
@@ -292,9 +287,11 @@ mod tests {
                 return f32::NEG_INFINITY;
             }
             let middle = (w + widths[i - 1]) / 2;
-            let at = ((slope + STEEPEST as isize) as usize * ROWS + first + i) * COLUMNS;
-            sum += strip.right[at + AXIS + middle];
-            sum += strip.left[at + COLUMNS - 1 - (AXIS - middle)];
+            let side = |slope: isize, column: usize| {
+                let m = (slope + STEEPEST as isize) as usize;
+                strip.sides[(m * ROWS + first + i) * COLUMNS + column]
+            };
+            sum += side(slope, AXIS + middle) + side(-slope, AXIS - middle);
             sum -= PRICES.slope * slope.unsigned_abs() as f32;
             if let Some(before) = before {
                 sum -= (PRICES.change * slope.abs_diff(before) as f32).min(PRICES.most);

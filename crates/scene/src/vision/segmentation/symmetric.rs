@@ -234,32 +234,28 @@ fn edges(window: &Window, local: &[f32], frame: &Frame, cell: f64, rows: usize) 
         both[p] = c * s * (yy - xx) + (c * c - s * s) * xy;
         mean[p] = m;
     }
-    let mut right = vec![0.0f32; SLOPES * n];
-    let mut left = vec![0.0f32; SLOPES * n];
-    let mut edge = vec![0.0f32; n];
+    let mut sides = vec![0.0f32; SLOPES * n];
+    // Its first and last ones twice.
+    let mut edge = vec![0.0f32; n + 2];
     for m in 0..SLOPES {
         let slope = m as f32 - STEEPEST as f32;
         let length = (1.0 + slope * slope).sqrt();
         vectorised(
             #[inline(always)]
             || {
-                for p in 0..n {
-                    let square = across[p] - 2.0 * slope * both[p] + slope * slope * along[p];
-                    edge[p] = square.max(0.0).sqrt() / length;
+                let tensor = across.iter().zip(&both).zip(&along);
+                for (edge, ((across, both), along)) in edge[1..=n].iter_mut().zip(tensor) {
+                    let square = across - 2.0 * slope * both + slope * slope * along;
+                    *edge = square.max(0.0).sqrt() / length;
                 }
-                let gain = &mut right[m * n..(m + 1) * n];
-                for p in 0..n {
-                    let e = edge[p].max(edge[p.saturating_sub(1)]).max(edge[(p + 1).min(n - 1)]);
-                    gain[p] = edge_gain(e, mean[p]) * length;
+                (edge[0], edge[n + 1]) = (edge[1], edge[n]);
+                let near = edge[..n].iter().zip(&edge[1..=n]).zip(&edge[2..]);
+                let gains = sides[m * n..(m + 1) * n].iter_mut();
+                for ((gain, mean), ((a, b), c)) in gains.zip(&mean).zip(near) {
+                    *gain = edge_gain(b.max(*a).max(*c), *mean) * length;
                 }
             },
         );
-    }
-    for m in 0..SLOPES {
-        let (from, to) = (&right[(SLOPES - 1 - m) * n..], &mut left[m * n..(m + 1) * n]);
-        for (to, from) in to.chunks_exact_mut(rows).zip(from.chunks_exact(rows)) {
-            to.iter_mut().zip(from.iter().rev()).for_each(|(t, f)| *t = *f);
-        }
     }
     let mut ends = vec![0.0f32; rows * (rows + 1)];
     for t in 0..rows {
@@ -272,7 +268,7 @@ fn edges(window: &Window, local: &[f32], frame: &Frame, cell: f64, rows: usize) 
             ends[t * (rows + 1) + d + 1] = sum;
         }
     }
-    Strip { rows, columns: rows, inside: vec![0.0; rows * (rows + 1)], ends, right, left }
+    Strip { rows, columns: rows, inside: vec![0.0; rows * (rows + 1)], ends, sides }
 }
 
 /// Fills in what the cells of a strip gain inside an outline.
