@@ -42,7 +42,7 @@ fn within(cell: usize, stride: usize, sides: &[f32], placed: &Placed) -> Option<
         let distance = expectation(bins) * stride as f64;
         let at = centre[k % 2] + if k < 2 { -distance } else { distance };
         let c = k % 2;
-        *bound = (at / scale[c]).clamp(0.0, placed.size[c]);
+        *bound = ((at - placed.origin[c] as f64) / scale[c]).clamp(0.0, placed.size[c]);
     }
     if placed.mirrored {
         (bounds[0], bounds[2]) = (placed.size[0] - bounds[2], placed.size[0] - bounds[0]);

@@ -45,13 +45,8 @@ impl View {
 /// Views for where an object that is missed, or a box that is off, costs more than the time: the
 /// larger an object is in the photograph, the smaller the view that shows it as the network knows
 /// its kind (docs/measurements/objects.md).
-pub const VIEWS: [View; 6] = {
-    const fn seen(part: f64) -> [View; 2] {
-        [View { part, mirrored: false }, View { part, mirrored: true }]
-    }
-    let ([a, b], [c, d], [e, f]) = (seen(1.0), seen(0.67), seen(0.55));
-    [a, b, c, d, e, f]
-};
+pub const VIEWS: [View; 3] =
+    [View::WHOLE, View { part: 0.6, mirrored: false }, View { part: 0.6, mirrored: true }];
 
 /// Options of the search for objects.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -11,9 +11,10 @@ const DEVIATIONS: [f32; 3] = [57.375, 57.12, 58.395];
 /// Where a photograph is among the samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Placed {
-    /// The width and height of the input: as few whole cells as hold the photograph, which
-    /// begins at the upper left.
+    /// The width and height of the input, of whole cells.
     pub input: [usize; 2],
+    /// The sample of the photograph's upper left corner, across and down.
+    pub origin: [usize; 2],
     /// The number of samples that it covers, across and down.
     pub samples: [usize; 2],
     /// Its size, pixels.
@@ -29,16 +30,22 @@ impl Placed {
     }
 }
 
+/// The number of samples around a photograph, both sides together, as far as [`SIDE`] has room.
+const MARGIN: usize = 32;
+
 /// Returns where a photograph is that is scaled so that its longer side takes up a view's part
-/// of [`SIDE`] samples.
+/// of [`SIDE`] samples: in the middle of an input that is hardly larger.
 pub(super) fn place(photo: &Photo, view: View) -> Placed {
     let size = [photo.width(), photo.height()].map(|n| n.max(1) as usize);
     let longer = size[0].max(size[1]) as f64;
     let taken = view.part * SIDE as f64;
     let fit = |n: usize| (libm::round(n as f64 * taken / longer) as usize).clamp(1, SIDE);
     let samples = size.map(fit);
+    let margin = MARGIN.min(SIDE - samples[0].max(samples[1]));
+    let input = samples.map(|n| (n + margin).next_multiple_of(STRIDES[2]));
     Placed {
-        input: samples.map(|n| n.next_multiple_of(STRIDES[2])),
+        input,
+        origin: [0, 1].map(|i| (input[i] - samples[i]) / 2),
         samples,
         size: size.map(|n| n as f64),
         mirrored: view.mirrored,
@@ -48,7 +55,7 @@ pub(super) fn place(photo: &Photo, view: View) -> Placed {
 /// Fills `out`, planes of blue, green and red samples, with a photograph so placed, the rest
 /// black. A sample is the mean of the area that it covers.
 pub(super) fn letterbox(photo: &Photo, placed: &Placed, out: &mut [f32]) {
-    let [across, down] = placed.input;
+    let ([across, down], [left, top]) = (placed.input, placed.origin);
     let (width, height) = (photo.width() as usize, photo.height() as usize);
     let rgb = photo.rgb().as_raw();
     let (columns, rows) = (parts(width, placed.samples[0]), parts(height, placed.samples[1]));
@@ -68,7 +75,7 @@ pub(super) fn letterbox(photo: &Photo, placed: &Placed, out: &mut [f32]) {
         for (i, sum) in line.iter().enumerate() {
             let i = if placed.mirrored { line.len() - 1 - i } else { i };
             // Blue first.
-            (0..3).for_each(|c| out[(c * down + j) * across + i] = sum[2 - c]);
+            (0..3).for_each(|c| out[(c * down + top + j) * across + left + i] = sum[2 - c]);
         }
     }
     for (c, plane) in out.chunks_exact_mut(across * down).enumerate() {
@@ -109,15 +116,15 @@ mod tests {
     use image::{Rgb, RgbImage};
 
     /// Returns the input that shows a photograph in a view, as numbers of a channel, row and
-    /// column.
+    /// column, from its upper left corner on.
     fn seen(rgb: RgbImage, view: View) -> (impl Fn(usize, usize, usize) -> f32, Placed) {
         let photo = Photo::from_rgb(rgb).unwrap();
         let placed = place(&photo, view);
-        let [across, down] = placed.input;
+        let ([across, down], [left, top]) = (placed.input, placed.origin);
         let mut out = vec![7.0; 3 * across * down];
         letterbox(&photo, &placed, &mut out);
         let value = move |c: usize, j: usize, i: usize| {
-            out[(c * down + j) * across + i] * DEVIATIONS[c] + MEANS[c]
+            out[(c * down + top + j) * across + left + i] * DEVIATIONS[c] + MEANS[c]
         };
         (value, placed)
     }
@@ -132,7 +139,7 @@ mod tests {
         // Five columns on two samples: 1, 1, 1/2 and 1/2, 1, 1.
         let rgb = RgbImage::from_fn(5, 2, |x, y| Rgb([10 * x as u8, 100 * y as u8, 7]));
         let (value, placed) = seen(rgb, taking(2, false));
-        assert_eq!((placed.scale(), placed.input), ([2.0 / 5.0, 1.0 / 2.0], [32, 32]));
+        assert_eq!((placed.scale(), placed.input), ([2.0 / 5.0, 1.0 / 2.0], [64, 64]));
         for (c, expected) in [(0, [7.0, 7.0]), (1, [50.0, 50.0]), (2, [8.0, 32.0])] {
             for i in 0..2 {
                 assert!((value(c, 0, i) - expected[i]).abs() < 1e-4, "{c} {i}");
@@ -152,13 +159,16 @@ mod tests {
     }
 
     #[test]
-    fn inputs_are_no_larger_than_photographs_and_may_be_mirrored() {
+    fn inputs_are_hardly_larger_than_photographs_and_may_be_mirrored() {
         let rgb = RgbImage::from_fn(400, 100, |x, _| Rgb([(x / 2) as u8; 3]));
         let (value, placed) = seen(rgb, taking(200, true));
-        assert_eq!((placed.input, placed.samples), ([224, 64], [200, 50]));
+        assert_eq!((placed.input, placed.samples), ([256, 96], [200, 50]));
+        assert_eq!(placed.origin, [28, 23]);
         for (i, expected) in [(0, 199.0), (99, 100.0), (199, 0.0), (200, 0.0)] {
             assert!((value(0, 20, i) - expected).abs() < 1e-3, "{i}: {}", value(0, 20, i));
         }
         assert!(value(0, 50, 0).abs() < 1e-4, "black below");
+        let (_, whole) = seen(RgbImage::new(400, 300), View::WHOLE);
+        assert_eq!((whole.input, whole.origin), ([416, 320], [0, 4]));
     }
 }

@@ -18,8 +18,13 @@ fn certain(sides: &mut [f32], cell: usize, side: usize, bin: usize) {
 fn decoded(outputs: &[[Vec<f32>; 2]; 3], least: f64) -> Vec<FoundObject> {
     let grids = [0, 1, 2].map(|k| [&outputs[k][0][..], &outputs[k][1][..]]);
     // Half a sample to a pixel across, a whole one down.
-    let placed =
-        Placed { input: [416; 2], samples: [350, 400], size: [700.0, 400.0], mirrored: false };
+    let placed = Placed {
+        input: [416; 2],
+        origin: [0; 2],
+        samples: [350, 400],
+        size: [700.0, 400.0],
+        mirrored: false,
+    };
     decode(&grids, &placed, least)
 }
 

@@ -23,7 +23,7 @@ pub use person::{Hypothesis, Landmark, Person};
 
 use crate::boxes::{around, overlap};
 use crate::nn::{Memory, Network, NetworkError};
-use crate::objects::{FoundObject, VIEWS, View as ObjectView};
+use crate::objects::{FoundObject, View as ObjectView};
 use area::Area;
 use consensus::{ONE, PersonBox, Run, by_person, consensus, prominence, same, seen, sure};
 use landmarks::View;
@@ -46,7 +46,13 @@ const IN_COMPANY: f64 = 0.75;
 const LARGE: f64 = 0.6;
 
 /// The views of a photograph in which boxes of people are looked for.
-pub const VIEWS_OF_PEOPLE: &[ObjectView] = VIEWS.split_at(4).0;
+pub const VIEWS_OF_PEOPLE: &[ObjectView] = &{
+    const fn seen(part: f64) -> [ObjectView; 2] {
+        [ObjectView { part, mirrored: false }, ObjectView { part, mirrored: true }]
+    }
+    let ([a, b], [c, d]) = (seen(1.0), seen(0.67));
+    [a, b, c, d]
+};
 
 /// Where to look for people.
 #[derive(Clone, Copy, Debug, PartialEq)]
