@@ -18,7 +18,7 @@ use pcadlang_report::embedded::{EmbeddedDraw, embedded};
 use pcadlang_report::pictures::jpeg;
 use pcadlang_scene::render::View;
 use pcadlang_workbench::session::Layer;
-use pcadlang_workbench::session::{as_view, picture_operand};
+use pcadlang_workbench::session::{as_view, picture_operand, reduced};
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 
@@ -72,8 +72,8 @@ pub fn write_scene(
     }
     let Some(mut scene) = embedded(view.camera(), &all) else { return Ok(()) };
     // Drawing and coding the pictures takes most of the time of a quick run's end.
-    let image = ready.image();
-    let drawn = map_side_by_side(&Layer::ALL, |l| layer(*l, view, image, located));
+    let image = ready.image().and_then(|image| reduced(image, SIDE));
+    let drawn = map_side_by_side(&Layer::ALL, |l| layer(*l, view, image.as_ref(), located));
     let mut layers = Map::new();
     for (l, picture) in Layer::ALL.into_iter().zip(drawn) {
         match picture {

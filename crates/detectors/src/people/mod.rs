@@ -27,7 +27,7 @@ use crate::objects::{FoundObject, View as ObjectView};
 use area::Area;
 use consensus::{ONE, PersonBox, Run, by_person, consensus, prominence, same, seen, sure};
 use landmarks::View;
-use pcadlang_numerics::platform::threads::side_by_side;
+use pcadlang_numerics::platform::threads::{both, side_by_side};
 use pcadlang_scene::vision::Photo;
 use std::thread::available_parallelism;
 use window::Window;
@@ -102,10 +102,8 @@ impl PeopleFinder {
         detection: &'static [u8],
         landmarks: &'static [u8],
     ) -> Result<PeopleFinder, NetworkError> {
-        let finder = PeopleFinder {
-            detection: Network::read(detection)?,
-            landmarks: Network::read(landmarks)?,
-        };
+        let (landmarks, detection) = both(|| Network::read(landmarks), || Network::read(detection));
+        let finder = PeopleFinder { detection: detection?, landmarks: landmarks? };
         detection::check(&finder.detection)?;
         landmarks::check(&finder.landmarks)?;
         Ok(finder)

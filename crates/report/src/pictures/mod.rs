@@ -42,14 +42,21 @@ where
     Ok(bytes)
 }
 
-/// Encodes a picture as a JPEG file of a quality from 1 to 100.
+/// Encodes a picture as a JPEG file of a quality from 1 to 100, with one channel if it is grey.
 ///
 /// # Errors
 /// Returns an error if the picture has no pixels.
 pub fn jpeg(picture: &image::RgbImage, quality: u8) -> Result<Vec<u8>, image::ImageError> {
     let mut bytes = Vec::new();
-    let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, quality);
-    picture.write_with_encoder(encoder)?;
+    let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, quality);
+    if picture.pixels().all(|p| p.0 == [p.0[0]; 3]) {
+        let grey = picture.pixels().map(|p| p.0[0]).collect();
+        let (width, height) = picture.dimensions();
+        encoder
+            .encode_image(&image::GrayImage::from_raw(width, height, grey).unwrap_or_default())?;
+    } else {
+        encoder.encode_image(picture)?;
+    }
     Ok(bytes)
 }
 
@@ -73,6 +80,15 @@ mod tests {
         let picture = image::RgbImage::from_fn(5, 3, |x, y| image::Rgb([x as u8, y as u8, 7]));
         let back = image::load_from_memory(&png(&picture).unwrap()).unwrap().to_rgb8();
         assert_eq!(back, picture);
+        for (picture, color) in [
+            (picture, image::ColorType::Rgb8),
+            (image::RgbImage::from_pixel(9, 4, image::Rgb([90; 3])), image::ColorType::L8),
+        ] {
+            let back = image::load_from_memory(&jpeg(&picture, 90).unwrap()).unwrap();
+            assert_eq!((back.color(), back.width()), (color, picture.width()));
+            let near = |(a, b): (&u8, &u8)| a.abs_diff(*b) < 9;
+            assert!(back.to_rgb8().iter().zip(picture.iter()).all(near));
+        }
         assert_eq!(mix([0, 100, 200], [100.0, 100.0, 300.0], 0.5), [50, 100, 228]);
     }
 }

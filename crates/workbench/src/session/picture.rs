@@ -306,6 +306,18 @@ pub fn photo_contours(image: &ImageValue) -> Option<ContourMap> {
     image.seen().or_else(found)
 }
 
+/// Returns what was observed at the size of layers and with its contours, for several of them:
+/// each would scale the photograph, and look for contours if the program used none. `None` without
+/// either.
+pub fn reduced(image: &ImageValue, size: u32) -> Option<ImageValue> {
+    let map = photo_contours(image)?;
+    let photo = image.shown().map(|p| {
+        let (width, height) = scaled((p.width(), p.height()), size);
+        Photo::from_rgb(resize(p.rgb(), width, height, FilterType::Triangle))
+    });
+    Some(ImageValue::contours(map, photo.and_then(Result::ok)))
+}
+
 /// Returns a size with this longer side.
 fn scaled((width, height): (u32, u32), longer: u32) -> (u32, u32) {
     let by = f64::from(longer.max(1)) / f64::from(width.max(height).max(1));

@@ -30,10 +30,8 @@ pub struct Prices {
 pub struct Strip {
     pub rows: usize,
     pub columns: usize,
-    /// Sums of what the cells of a row before each column gain inside an outline: one entry
-    /// more per row than there are columns.
-    pub inside: Vec<f32>,
-    /// The same of what they gain on a flat end.
+    /// Sums of what the cells of a row before each column gain on a flat end: one entry more per
+    /// row than there are columns.
     pub ends: Vec<f32>,
     /// What a side gains per row, by its slope to the right, row and column. That of a left side
     /// is the reverse of the outline's.
@@ -67,9 +65,11 @@ const STATES: usize = SLOPES + 1;
 
 impl Strip {
     /// Returns the best outline about the axis in a column, with half-widths of at most
-    /// `widest` cells; `None` if the strip has no room for any.
+    /// `widest` cells; `None` if the strip has no room for any. `inside` is what cells gain inside
+    /// it, in sums like those of ends.
     pub fn outline(
         &self,
+        inside: &[f32],
         axis: usize,
         widest: usize,
         prices: &Prices,
@@ -88,7 +88,7 @@ impl Strip {
         table.spans.iter_mut().for_each(|s| s.resize(stride, NEVER));
         let (mut best, mut end) = (NEVER, (0, 0, 0));
         for t in 1..self.rows - 1 {
-            let Table { best: scores, before, spans: [begin, inside, after, most] } = &mut *table;
+            let Table { best: scores, before, spans: [begin, within, after, most] } = &mut *table;
             let (done, rest) = scores.split_at_mut(t * STATES * stride);
             let row = &mut rest[..STATES * stride];
             vectorised(
@@ -99,14 +99,14 @@ impl Strip {
                         self.continued(axis, t, stride, prices.slope, before, row);
                     }
                     self.spans(&self.ends, axis, t, begin);
-                    self.spans(&self.inside, axis, t, inside);
+                    self.spans(inside, axis, t, within);
                     self.spans(&self.ends, axis, t + 1, after);
                     row[SLOPES * stride..].copy_from_slice(begin);
                     most.fill(NEVER);
                     for scores in row.chunks_exact_mut(stride) {
-                        for ((score, inside), most) in scores.iter_mut().zip(&*inside).zip(&mut *most)
-                        {
-                            *score += inside;
+                        let gained = scores.iter_mut().zip(&*within).zip(&mut *most);
+                        for ((score, within), most) in gained {
+                            *score += within;
                             *most = most.max(*score);
                         }
                     }
@@ -245,8 +245,8 @@ mod tests {
     const AXIS: usize = 13;
     const PRICES: Prices = Prices { slope: 0.1, change: 0.3, most: 1.5 };
 
-    /// A strip of random gains, as sums and by cell.
-    fn strip(seed: u64) -> (Strip, Vec<f32>, Vec<f32>) {
+    /// A strip of random gains and what is inside, as sums, and both by cell.
+    fn strip(seed: u64) -> (Strip, Vec<f32>, [Vec<f32>; 2]) {
         let mut next = numbers(seed);
         let mut list =
             |n: usize, scale: f32| -> Vec<f32> { (0..n).map(|_| scale * (next() - 0.5)).collect() };
@@ -258,15 +258,8 @@ mod tests {
             };
             cells.chunks(COLUMNS).flat_map(row).collect()
         };
-        let (inside_sums, ends_sums) = (sums(&inside), sums(&ends));
-        let strip = Strip {
-            rows: ROWS,
-            columns: COLUMNS,
-            inside: inside_sums,
-            ends: ends_sums,
-            sides,
-        };
-        (strip, inside, ends)
+        let strip = Strip { rows: ROWS, columns: COLUMNS, ends: sums(&ends), sides };
+        (strip, sums(&inside), [inside, ends])
     }
 
     /// What an outline gains, cell by cell.
@@ -306,8 +299,8 @@ mod tests {
         const WIDEST: usize = 10;
         let mut table = Table::default();
         for seed in 0..30 {
-            let (strip, inside, ends) = strip(seed);
-            let found = strip.outline(AXIS, WIDEST, &PRICES, &mut table).unwrap();
+            let (strip, sums, [inside, ends]) = strip(seed);
+            let found = strip.outline(&sums, AXIS, WIDEST, &PRICES, &mut table).unwrap();
             let own = gain(&strip, &inside, &ends, found.first, &found.widths);
             assert!((found.score - own).abs() < 1e-3, "{} is {own}", found.score);
             let mut best = f32::NEG_INFINITY;
@@ -328,10 +321,11 @@ mod tests {
 
     #[test]
     fn without_room_there_is_no_outline() {
-        let (strip, _, _) = strip(1);
+        let (strip, sums, _) = strip(1);
         let mut table = Table::default();
         for (axis, widest) in [(0, 10), (3, 10), (COLUMNS - 4, 10), (COLUMNS, 10), (AXIS, 1)] {
-            assert_eq!(strip.outline(axis, widest, &PRICES, &mut table), None, "{axis} {widest}");
+            let found = strip.outline(&sums, axis, widest, &PRICES, &mut table);
+            assert_eq!(found, None, "{axis} {widest}");
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::vision::candidates::pixels::Pixels;
 use crate::vision::detect::gradient::smoothed;
 use crate::vision::hint::polygon;
 use pcadlang_numerics::num::simd::vectorised;
+use pcadlang_numerics::platform::threads::map_side_by_side;
 
 /// Cells along the longer side of the frame.
 const CELLS: f64 = 72.0;
@@ -73,36 +74,34 @@ pub fn outlines(window: &Window, known: &Known) -> Vec<Symmetric> {
         let shorter = 2.0 * frame.half[0].min(frame.half[1]);
         (&ANGLES, OFFSETS.iter().map(|o| o * shorter / cell).collect())
     };
-    let mut turned: Vec<Turned> = angles
-        .iter()
-        .map(|angle| {
-            let turned = Frame { lean: frame.lean + angle, ..frame };
-            Turned { frame: turned, strip: edges(window, &local, &turned, cell, rows) }
-        })
-        .collect();
+    let turned = map_side_by_side(angles, |angle| {
+        let turned = Frame { lean: frame.lean + angle, ..frame };
+        Turned { frame: turned, strip: edges(window, &local, &turned, cell, rows) }
+    });
     let mut axes: Vec<(usize, f64)> =
         (0..turned.len()).flat_map(|a| offsets.iter().map(move |o| (a, *o))).collect();
     let widest = (0.62 * libm::hypot(2.0 * frame.half[0], 2.0 * frame.half[1]) / cell) as usize;
-    let mut table = Table::default();
     let mut on: Option<Vec<bool>> = None;
     let mut found: Vec<Symmetric> = Vec::new();
     for _ in 0..ESTIMATES {
         let gains = gains(known, &known.colours(&known.belief(on.as_deref())));
-        for (a, t) in turned.iter_mut().enumerate() {
-            if axes.iter().any(|(b, _)| *b == a) {
-                fill_inside(window, &gains, t, cell);
-            }
-        }
-        let mut scored: Vec<(Symmetric, (usize, f64))> = axes
-            .iter()
-            .filter_map(|(a, offset)| {
-                let Turned { frame: turned, strip } = &turned[*a];
+        let mut used: Vec<usize> = axes.iter().map(|(a, _)| *a).collect();
+        used.sort_unstable();
+        used.dedup();
+        let scored = map_side_by_side(&used, |a| {
+            let Turned { frame: turned, strip } = &turned[*a];
+            let (inside, mut table) =
+                (inside(window, &gains, turned, cell, rows), Table::default());
+            let about = |offset: f64| {
                 let column = (0.5 * rows as f64 + offset).round() as usize;
-                let outline = strip.outline(column, widest, &PRICES, &mut table)?;
+                let outline = strip.outline(&inside, column, widest, &PRICES, &mut table)?;
                 let found = Symmetric::new(&outline, column, turned, &frame, cell, rows);
-                Some((found, (*a, *offset)))
-            })
-            .collect();
+                Some((found, (*a, offset)))
+            };
+            let own = axes.iter().filter(|(b, _)| b == a).map(|(_, offset)| *offset);
+            own.filter_map(about).collect::<Vec<_>>()
+        });
+        let mut scored: Vec<(Symmetric, (usize, f64))> = scored.into_iter().flatten().collect();
         scored.sort_by(|a, b| b.0.score.total_cmp(&a.0.score));
         scored.truncate(KEPT);
         axes = scored.iter().map(|(_, axis)| *axis).collect();
@@ -268,19 +267,20 @@ fn edges(window: &Window, local: &[f32], frame: &Frame, cell: f64, rows: usize) 
             ends[t * (rows + 1) + d + 1] = sum;
         }
     }
-    Strip { rows, columns: rows, inside: vec![0.0; rows * (rows + 1)], ends, sides }
+    Strip { rows, columns: rows, ends, sides }
 }
 
-/// Fills in what the cells of a strip gain inside an outline.
-fn fill_inside(window: &Window, gains: &[f32], turned: &mut Turned, cell: f64) {
-    let rows = turned.strip.rows;
+/// Returns sums of what the cells of a strip gain inside an outline.
+fn inside(window: &Window, gains: &[f32], turned: &Frame, cell: f64, rows: usize) -> Vec<f32> {
+    let mut sums = vec![0.0; rows * (rows + 1)];
     let mut sum = 0.0;
-    for (p, at) in cells(&turned.frame, cell, rows).enumerate() {
+    for (p, at) in cells(turned, cell, rows).enumerate() {
         let (t, d) = (p / rows, p % rows);
         if d == 0 {
             sum = 0.0;
         }
         sum += between(window, at, [BEYOND], |p| [gains[p]])[0];
-        turned.strip.inside[t * (rows + 1) + d + 1] = sum;
+        sums[t * (rows + 1) + d + 1] = sum;
     }
+    sums
 }
