@@ -5,7 +5,7 @@ use image::RgbImage;
 use pcadlang_detectors::boxes::sides;
 use pcadlang_detectors::objects::{self, FoundObject, ObjectFinder, ObjectOptions, View};
 use pcadlang_detectors::people::{FindOptions, Person, Search, VIEWS_OF_PEOPLE, json};
-use pcadlang_report::pictures::{DETECTED, dots, limbs, picture_size, png};
+use pcadlang_report::pictures::{DETECTED, dots, limbs, picture_size, png, scaled};
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::hint::rectangle;
 use pcadlang_runs::{files, inputs};
@@ -215,7 +215,7 @@ fn line(number: usize, p: &Person, (width, height): (u32, u32)) -> String {
 /// The photograph at the size of pictures.
 fn base(photo: &Photo) -> RgbImage {
     let (width, height) = picture_size(photo.width(), photo.height());
-    image::imageops::resize(photo.rgb(), width, height, image::imageops::FilterType::Triangle)
+    scaled(photo.rgb(), width, height)
 }
 
 /// Draws the boxes of objects over the photograph, the best on top.

@@ -15,8 +15,7 @@ use crate::reopening::seen::{show_contours, show_joints, show_photo};
 use crate::scene;
 use crate::verdict::Judgement;
 use crate::watched::Watched;
-use image::imageops::{FilterType, resize};
-use image::{GrayImage, RgbImage};
+use image::GrayImage;
 use pcadlang_engine::lang::value::Located;
 use pcadlang_engine::trace::Trace;
 use pcadlang_inference::draws::SiteStats;
@@ -127,15 +126,13 @@ fn draw(
     shown.agreement = agreement;
     let objects = objects(&view.solid_in_files());
     let photo = photo.map(Photo::rgb);
-    let large = photo.and_then(enlarged);
-    let large = large.as_ref().or(photo);
     let encode = |p: Result<Vec<u8>, image::ImageError>| p.map_err(|e| plain(e.to_string()));
     let on_page = Mutex::new(Vec::new());
     let on_page = || on_page.lock().unwrap_or_else(PoisonError::into_inner);
     // What takes longest first.
     do_all(&[
         &|| {
-            let mut over = over(view, large, (width, height));
+            let mut over = over(view, photo, (width, height));
             detected(&mut over, located, (width, height));
             let file = encode(png(&over))?;
             write_in(dir, "overlay.png", &file)?;
@@ -143,7 +140,7 @@ fn draw(
             on_page().push(("overlay.png", drawn));
             Ok(())
         },
-        &|| large.map_or(Ok(()), |photo| show_photo(dir, photo)),
+        &|| photo.map_or(Ok(()), |photo| show_photo(dir, photo)),
         &|| {
             // Joints are cut out of the photograph as it was given.
             let photo = seen.and_then(|(image, _)| image.as_photo());
@@ -178,13 +175,6 @@ fn draw(
     shown.inside = inside(view.solid(), camera);
     shown.metre = view.metre();
     write_poses(dir, view)
-}
-
-/// Returns a photograph at the size of pictures, if that is larger.
-fn enlarged(photo: &RgbImage) -> Option<RgbImage> {
-    let (width, height) = pictures::picture_size(photo.width(), photo.height());
-    let is_small = (width, height) != photo.dimensions();
-    is_small.then(|| resize(photo, width, height, FilterType::Triangle))
 }
 
 /// Returns the fraction of a solid's vertices that are in the picture and in front of the

@@ -6,11 +6,13 @@
 //! buffers count as background, so no input panics.
 
 mod layers;
+mod scale;
 mod sheet;
 mod strokes;
 mod surface;
 
 pub use layers::{depth, normals, parts, residuals};
+pub use scale::scaled;
 pub use sheet::contact_sheet;
 pub use strokes::{DETECTED, OF_SCENE, contour_map, contours, dots, limbs};
 pub use surface::{frequency, mask, overlaid, overlay, shaded};

@@ -11,7 +11,6 @@ use pcadlang_engine::lang::value::Located;
 use pcadlang_library::scene::ImageValue;
 use pcadlang_report::RunDir;
 use pcadlang_report::pictures::{self, DETECTED, LONGER_SIDE, OF_SCENE, jpeg, png};
-use pcadlang_workbench::session::photo_contours;
 
 /// The maximum longer side of the photograph, in pixels.
 const LARGEST: u32 = 1024;
@@ -20,10 +19,11 @@ const QUALITY: u8 = 90;
 /// The margin around the joints, as a fraction of their extent.
 const MARGIN: f64 = 0.15;
 
-/// Writes `photo.jpg`, of a photograph at the size of pictures.
+/// Writes a photograph at the size of pictures, `photo.jpg`.
 pub fn show_photo(dir: &RunDir, photo: &RgbImage) -> Result<(), Failure> {
-    let small = (photo.width().max(photo.height()) > LARGEST).then(|| sized(photo, LARGEST));
-    let bytes = jpeg(small.as_ref().unwrap_or(photo), QUALITY).map_err(|e| plain(e.to_string()))?;
+    let (w, h) = pictures::picture_size(photo.width(), photo.height());
+    let small = sized(photo, w.max(h).min(LARGEST));
+    let bytes = jpeg(&small, QUALITY).map_err(|e| plain(e.to_string()))?;
     write_in(dir, "photo.jpg", &bytes)
 }
 
@@ -41,7 +41,7 @@ pub fn show_joints(
 
 /// Writes the contours of what was observed as `photo_contours.png`, of this size.
 pub fn show_contours(dir: &RunDir, image: &ImageValue, size: (u32, u32)) -> Result<(), Failure> {
-    let Some(map) = photo_contours(image) else { return Ok(()) };
+    let Some(map) = image.contours_shown() else { return Ok(()) };
     let lines = pictures::contour_map(size.0, size.1, &map);
     write_in(dir, "photo_contours.png", &png(&lines).map_err(|e| plain(e.to_string()))?)
 }
