@@ -45,8 +45,12 @@ impl View {
 /// Views for where an object that is missed, or a box that is off, costs more than the time: the
 /// larger an object is in the photograph, the smaller the view that shows it as the network knows
 /// its kind (docs/measurements/objects.md).
-pub const VIEWS: [View; 3] =
-    [View::WHOLE, View { part: 0.6, mirrored: false }, View { part: 0.6, mirrored: true }];
+pub const VIEWS: [View; 4] = [
+    View::WHOLE,
+    View { part: 0.67, mirrored: false },
+    View { part: 0.55, mirrored: false },
+    View { part: 0.55, mirrored: true },
+];
 
 /// Options of the search for objects.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -30,26 +30,27 @@ impl Placed {
     }
 }
 
-/// The number of samples around a photograph, both sides together, as far as [`SIDE`] has room.
+/// The number of samples around a photograph in a smaller view, both sides together, at least.
 const MARGIN: usize = 32;
 
 /// Returns where a photograph is that is scaled so that its longer side takes up a view's part
-/// of [`SIDE`] samples: in the middle of an input that is hardly larger.
+/// of [`SIDE`] samples: at the upper left of a whole view, which is a square, and in the middle of
+/// a smaller one, which is hardly larger.
 pub(super) fn place(photo: &Photo, view: View) -> Placed {
     let size = [photo.width(), photo.height()].map(|n| n.max(1) as usize);
     let longer = size[0].max(size[1]) as f64;
     let taken = view.part * SIDE as f64;
     let fit = |n: usize| (libm::round(n as f64 * taken / longer) as usize).clamp(1, SIDE);
     let samples = size.map(fit);
-    let margin = MARGIN.min(SIDE - samples[0].max(samples[1]));
-    let input = samples.map(|n| (n + margin).next_multiple_of(STRIDES[2]));
-    Placed {
-        input,
-        origin: [0, 1].map(|i| (input[i] - samples[i]) / 2),
-        samples,
-        size: size.map(|n| n as f64),
-        mirrored: view.mirrored,
-    }
+    let (input, origin) = match view.part < 1.0 {
+        true => {
+            let input = samples.map(|n| (n + MARGIN).next_multiple_of(STRIDES[2]));
+            (input, [0, 1].map(|i| (input[i] - samples[i]) / 2))
+        }
+        false => ([SIDE; 2], [0; 2]),
+    };
+    let size = size.map(|n| n as f64);
+    Placed { input, origin, samples, size, mirrored: view.mirrored }
 }
 
 /// Fills `out`, planes of blue, green and red samples, with a photograph so placed, the rest
@@ -159,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn inputs_are_hardly_larger_than_photographs_and_may_be_mirrored() {
+    fn smaller_views_are_hardly_larger_than_photographs_and_may_be_mirrored() {
         let rgb = RgbImage::from_fn(400, 100, |x, _| Rgb([(x / 2) as u8; 3]));
         let (value, placed) = seen(rgb, taking(200, true));
         assert_eq!((placed.input, placed.samples), ([256, 96], [200, 50]));
@@ -169,6 +170,6 @@ mod tests {
         }
         assert!(value(0, 50, 0).abs() < 1e-4, "black below");
         let (_, whole) = seen(RgbImage::new(400, 300), View::WHOLE);
-        assert_eq!((whole.input, whole.origin), ([416, 320], [0, 4]));
+        assert_eq!((whole.input, whole.origin), ([416, 416], [0, 0]));
     }
 }
