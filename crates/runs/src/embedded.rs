@@ -12,7 +12,7 @@ use pcadlang_engine::lang::value::Located;
 use pcadlang_engine::trace::Trace;
 use pcadlang_inference::KeptTrace;
 use pcadlang_library::scene::{ImageValue, ViewValue};
-use pcadlang_numerics::platform::threads::map_side_by_side;
+use pcadlang_numerics::platform::threads::{both, map_side_by_side};
 use pcadlang_report::RunDir;
 use pcadlang_report::embedded::{EmbeddedDraw, embedded};
 use pcadlang_report::pictures::jpeg;
@@ -70,10 +70,13 @@ pub fn write_scene(
             solid: view.solid().clone(),
         });
     }
-    let Some(mut scene) = embedded(view.camera(), &all) else { return Ok(()) };
     // Drawing and coding the pictures takes most of the time of a quick run's end.
-    let image = ready.image().and_then(|image| reduced(image, SIDE));
-    let drawn = map_side_by_side(&Layer::ALL, |l| layer(*l, view, image.as_ref(), located));
+    let drawn = || {
+        let image = ready.image().and_then(|image| reduced(image, SIDE));
+        map_side_by_side(&Layer::ALL, |l| layer(*l, view, image.as_ref(), located))
+    };
+    let (scene, drawn) = both(|| embedded(view.camera(), &all), drawn);
+    let Some(mut scene) = scene else { return Ok(()) };
     let mut layers = Map::new();
     for (l, picture) in Layer::ALL.into_iter().zip(drawn) {
         match picture {
