@@ -171,7 +171,7 @@ impl Detector {
 }
 
 /// Returns which outputs are the scores and the sides of boxes for each stride, by their
-/// shapes, for an input of so many samples.
+/// shapes, for an input of this number of samples.
 fn outputs(network: &Network, samples: usize) -> Option<[[usize; 2]; 3]> {
     let find = |stride: usize, numbers: usize| {
         let cells = samples / (stride * stride);

@@ -130,7 +130,7 @@ mod tests {
         (value, placed)
     }
 
-    /// A view in which a photograph's longer side takes up so many samples.
+    /// A view in which a photograph's longer side takes up this number of samples.
     fn taking(samples: usize, mirrored: bool) -> View {
         View { part: samples as f64 / SIDE as f64, mirrored }
     }
