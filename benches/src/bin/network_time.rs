@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             None => None,
         };
         let network = match &weights {
-            Some(weights) => Network::read_graph_model(&bytes, weights)?,
+            Some(weights) => Network::read_graph_model(&bytes, weights, None)?,
             None => Network::read(&bytes)?,
         };
         let input = vec![0.5; network.input_shape().iter().product()];

@@ -12,7 +12,7 @@
 //! Only people with a confidence of `least` or more count, for each of these.
 
 use pcadlang_detectors::boxes::overlap;
-use pcadlang_detectors::objects::{self, ObjectOptions};
+use pcadlang_detectors::objects::{ObjectFinder, ObjectOptions};
 use pcadlang_detectors::people::{FindOptions, Person, Search, VIEWS_OF_PEOPLE, networks};
 use pcadlang_scene::vision::{Limits, photo};
 use serde_json::Value;
@@ -129,7 +129,7 @@ fn main() -> Result<(), String> {
     }
     let text = std::fs::read_to_string(file).map_err(|e| e.to_string())?;
     let data: Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
-    let (finder, boxes) = (networks::finder()?, objects::networks::finder()?);
+    let finder = networks::finder()?;
     let mut sums: Vec<(f64, Sums)> = least.into_iter().map(|l| (l, Sums::default())).collect();
     let sure = sums.iter().map(|(l, _)| *l).fold(1.0, f64::min);
     for image in data["images"].as_array().ok_or("no images")? {
@@ -141,7 +141,8 @@ fn main() -> Result<(), String> {
         let bytes = std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?;
         let photo = photo::decode(&bytes, &Limits::default()).map_err(|e| e.to_string())?;
         let wide = ObjectOptions { least: 0.05, most: usize::MAX };
-        let seen = boxes.find_in_views(&photo, VIEWS_OF_PEOPLE, &wide);
+        let seen = ObjectFinder::INCLUDED.find_in_views(&photo, VIEWS_OF_PEOPLE, &wide);
+        let seen = seen.map_err(|e| e.to_string())?;
         let options = FindOptions { most: 20, sure, ..FindOptions::default() };
         let people = finder.find(&photo, Search::Everywhere(&seen), &options, 0);
         let annotations = data["annotations"].as_array().ok_or("no annotations")?;

@@ -3,9 +3,9 @@
 use clap::Args;
 use image::RgbImage;
 use pcadlang_detectors::boxes::sides;
-use pcadlang_detectors::objects::{self, FoundObject, ObjectOptions, View};
+use pcadlang_detectors::objects::{self, FoundObject, ObjectFinder, ObjectOptions, View};
 use pcadlang_detectors::people::{FindOptions, Person, Search, VIEWS_OF_PEOPLE, json};
-use pcadlang_report::pictures::{DETECTED, dots, limbs, picture_size, png};
+use pcadlang_report::pictures::{DETECTED, dots, limbs, picture_size, png, scaled};
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::hint::rectangle;
 use pcadlang_runs::{files, inputs};
@@ -116,9 +116,7 @@ fn detect_people(a: &Detect, photo: &Photo) -> Result<(), Failure> {
     let wide = ObjectOptions { most: usize::MAX, ..ObjectOptions::default() };
     let objects = match a.bounds {
         Some(_) => Vec::new(),
-        None => {
-            objects::networks::finder().map_err(plain)?.find_in_views(photo, VIEWS_OF_PEOPLE, &wide)
-        }
+        None => objects_in(photo, VIEWS_OF_PEOPLE, &wide)?,
     };
     let within = a.bounds.map(|b| Search::Within(sides(b)));
     let search = within.unwrap_or(Search::Everywhere(&objects));
@@ -138,8 +136,7 @@ fn detect_people(a: &Detect, photo: &Photo) -> Result<(), Failure> {
 
 /// Detects the objects in a photograph, and lists them with the colours of their boxes.
 fn detect_objects(a: &Detect, photo: &Photo) -> Result<(), Failure> {
-    let finder = objects::networks::finder().map_err(plain)?;
-    let found = finder.find(photo, View::WHOLE, &ObjectOptions::default());
+    let found = objects_in(photo, &[View::WHOLE], &ObjectOptions::default())?;
     let file = objects::json::coco(&found, (photo.width(), photo.height()), &name(a), a.image_id);
     write(a, "objects.json", &format!("{file:#}\n"), || boxes(photo, &found))?;
     match found.len() {
@@ -157,6 +154,14 @@ fn detect_objects(a: &Detect, photo: &Photo) -> Result<(), Failure> {
         );
     }
     Ok(())
+}
+
+fn objects_in(
+    photo: &Photo,
+    views: &[View],
+    options: &ObjectOptions,
+) -> Result<Vec<FoundObject>, Failure> {
+    ObjectFinder::INCLUDED.find_in_views(photo, views, options).map_err(|e| plain(e.to_string()))
 }
 
 /// The photograph's name without its folder.
@@ -210,7 +215,7 @@ fn line(number: usize, p: &Person, (width, height): (u32, u32)) -> String {
 /// The photograph at the size of pictures.
 fn base(photo: &Photo) -> RgbImage {
     let (width, height) = picture_size(photo.width(), photo.height());
-    image::imageops::resize(photo.rgb(), width, height, image::imageops::FilterType::Triangle)
+    scaled(photo.rgb(), width, height)
 }
 
 /// Draws the boxes of objects over the photograph, the best on top.

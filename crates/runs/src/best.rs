@@ -5,12 +5,13 @@
 
 use crate::args::Job;
 use crate::failure::{Failure, plain};
-use crate::files::write_in;
+use crate::files::{do_all, write_in};
 use crate::inputs::Ready;
 use crate::people;
 use crate::pose::write_poses;
 use crate::progress::Ending;
-use crate::reopening::seen::show_seen;
+use crate::reopening::page::{self, PagePicture};
+use crate::reopening::seen::{show_contours, show_joints, show_photo};
 use crate::scene;
 use crate::verdict::Judgement;
 use crate::watched::Watched;
@@ -27,7 +28,7 @@ use pcadlang_scene::geom::{Object, Solid, glb, obj};
 use pcadlang_scene::render::{Camera, Frame, View};
 use pcadlang_scene::vision::{Mask, Photo, npy};
 use pcadlang_workbench::session::{detected, exported, exported_operand, over};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The time until the best state is written first.
@@ -51,6 +52,8 @@ pub struct Shown {
     /// How far the chains' last states cover the same pixels: the number of pixels that
     /// all of them cover, divided by that of pixels that any of them covers.
     pub agreement: Option<f64>,
+    /// Pictures as they are on the page.
+    pub pictures: Vec<PagePicture>,
 }
 
 /// Rebuilds the state with the highest log joint density of all chains, saves it, and
@@ -75,11 +78,9 @@ pub fn show_best(
         let photo = image.and_then(ImageValue::as_photo);
         let most = if full_size { u32::MAX } else { ImageValue::SHOWN };
         let size = bounded(extent(&view, photo), most);
+        let seen = image.map(|image| (image, bounded(image.size(), most)));
         let photo = if full_size { photo } else { image.and_then(ImageValue::shown) };
-        draw(dir, &view, &located, (chains, seed), (photo, size), &mut shown)?;
-        let seen =
-            |image: &ImageValue| show_seen(dir, image, bounded(image.size(), most), &located);
-        image.map_or(Ok(()), seen)?;
+        draw(dir, &view, &located, (chains, seed), (photo, size), seen, &mut shown)?;
         shown.view = Some(ViewValue(view));
         shown.located = located;
     }
@@ -106,41 +107,71 @@ pub fn keep_best(dir: &RunDir, model: &Model, best: &BestSoFar, ending: &Ending,
 }
 
 /// Writes depth, normals, mask and meshes, and the overlay, contours and mask frequency as
-/// pictures, of this size.
+/// pictures, of this size, and what was observed, of its own.
 fn draw(
     dir: &RunDir,
     view: &Arc<View>,
     located: &[Located],
     (chains, seed): (&[ChainResult], u64),
     (photo, (width, height)): (Option<&Photo>, (u32, u32)),
+    seen: Option<(&ImageValue, (u32, u32))>,
     shown: &mut Shown,
 ) -> Result<(), Failure> {
     let camera = view.camera();
     let size = width.max(height);
     let frame = view.frame(size);
     shown.size = Some([frame.width, frame.height]);
-    let shape = [frame.height as usize, frame.width as usize];
-    write_in(dir, "depth.npy", &npy::f32_array(&shape, frame.depth.iter().copied()))?;
-    let normals = npy::f32_array(&[shape[0], shape[1], 3], frame.normal.iter().flatten().copied());
-    write_in(dir, "normals.npy", &normals)?;
     shown.mask = covered(&frame);
-    let bytes = frame.mask().map(|m| if m { 255 } else { 0 }).collect();
-    let encode = |p: Result<Vec<u8>, image::ImageError>| p.map_err(|e| plain(e.to_string()));
-    if let Some(mask) = GrayImage::from_raw(frame.width, frame.height, bytes) {
-        write_in(dir, "mask.png", &encode(png(&mask))?)?;
-    }
-    let mut over = over(view, photo.map(Photo::rgb), (width, height));
-    detected(&mut over, located, (width, height));
-    let lines = pictures::contours(frame.width, frame.height, &view.contours(size).slice());
-    write_in(dir, "overlay.png", &encode(png(&over))?)?;
-    write_in(dir, "contours.png", &encode(png(&lines))?)?;
     let (spread, agreement) = frequency(chains.iter().map(|c| c.last.clone()), seed);
     shown.agreement = agreement;
-    write_in(dir, "uncertainty.png", &encode(png(&spread))?)?;
-    if let Some(objects) = objects(&view.solid_in_files()) {
-        write_in(dir, "best.obj", obj::write(&objects).as_bytes())?;
-        write_in(dir, "best.glb", &glb::write(&objects))?;
-    }
+    let objects = objects(&view.solid_in_files());
+    let photo = photo.map(Photo::rgb);
+    let encode = |p: Result<Vec<u8>, image::ImageError>| p.map_err(|e| plain(e.to_string()));
+    let on_page = Mutex::new(Vec::new());
+    let on_page = || on_page.lock().unwrap_or_else(PoisonError::into_inner);
+    // What takes longest first.
+    do_all(&[
+        &|| {
+            let mut over = over(view, photo, (width, height));
+            detected(&mut over, located, (width, height));
+            let file = encode(png(&over))?;
+            write_in(dir, "overlay.png", &file)?;
+            let drawn = page::on_page(&over, file);
+            on_page().push(("overlay.png", drawn));
+            Ok(())
+        },
+        &|| photo.map_or(Ok(()), |photo| show_photo(dir, photo)),
+        &|| {
+            // Joints are cut out of the photograph as it was given.
+            let photo = seen.and_then(|(image, _)| image.as_photo());
+            let joints = photo.map(|p| show_joints(dir, p.rgb(), located)).transpose()?;
+            on_page().extend(joints.flatten());
+            Ok(())
+        },
+        &|| seen.map_or(Ok(()), |(image, size)| show_contours(dir, image, size)),
+        &|| {
+            let shape = [frame.height as usize, frame.width as usize];
+            write_in(dir, "depth.npy", &npy::f32_array(&shape, frame.depth.iter().copied()))?;
+            let [rows, columns] = shape;
+            let normals = frame.normal.iter().flatten().copied();
+            write_in(dir, "normals.npy", &npy::f32_array(&[rows, columns, 3], normals))?;
+            let bytes = frame.mask().map(|m| if m { 255 } else { 0 }).collect();
+            let mask = GrayImage::from_raw(frame.width, frame.height, bytes);
+            mask.map_or(Ok(()), |mask| write_in(dir, "mask.png", &encode(png(&mask))?))
+        },
+        &|| {
+            let lines = view.contours(size);
+            let lines = pictures::contours(frame.width, frame.height, &lines.slice());
+            write_in(dir, "contours.png", &encode(png(&lines))?)?;
+            write_in(dir, "uncertainty.png", &encode(png(&spread))?)
+        },
+        &|| {
+            let Some(objects) = &objects else { return Ok(()) };
+            write_in(dir, "best.obj", obj::write(objects).as_bytes())?;
+            write_in(dir, "best.glb", &glb::write(objects))
+        },
+    ])?;
+    shown.pictures = std::mem::take(&mut *on_page());
     shown.inside = inside(view.solid(), camera);
     shown.metre = view.metre();
     write_poses(dir, view)

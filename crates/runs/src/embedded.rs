@@ -12,13 +12,13 @@ use pcadlang_engine::lang::value::Located;
 use pcadlang_engine::trace::Trace;
 use pcadlang_inference::KeptTrace;
 use pcadlang_library::scene::{ImageValue, ViewValue};
-use pcadlang_numerics::platform::threads::map_side_by_side;
+use pcadlang_numerics::platform::threads::{both, map_side_by_side};
 use pcadlang_report::RunDir;
 use pcadlang_report::embedded::{EmbeddedDraw, embedded};
 use pcadlang_report::pictures::jpeg;
 use pcadlang_scene::render::View;
 use pcadlang_workbench::session::Layer;
-use pcadlang_workbench::session::{as_view, picture_operand};
+use pcadlang_workbench::session::{as_view, picture_operand, reduced};
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 
@@ -70,10 +70,13 @@ pub fn write_scene(
             solid: view.solid().clone(),
         });
     }
-    let Some(mut scene) = embedded(view.camera(), &all) else { return Ok(()) };
     // Drawing and coding the pictures takes most of the time of a quick run's end.
-    let image = ready.image();
-    let drawn = map_side_by_side(&Layer::ALL, |l| layer(*l, view, image, located));
+    let drawn = || {
+        let image = ready.image().and_then(|image| reduced(image, SIDE));
+        map_side_by_side(&Layer::ALL, |l| layer(*l, view, image.as_ref(), located))
+    };
+    let (scene, drawn) = both(|| embedded(view.camera(), &all), drawn);
+    let Some(mut scene) = scene else { return Ok(()) };
     let mut layers = Map::new();
     for (l, picture) in Layer::ALL.into_iter().zip(drawn) {
         match picture {

@@ -4,6 +4,7 @@ use crate::failure::{Failure, plain};
 use pcadlang_engine::lang::load::reason;
 use pcadlang_engine::lang::reach::read_file;
 use pcadlang_library::shipped;
+use pcadlang_numerics::platform::threads::map_side_by_side;
 use pcadlang_report::RunDir;
 use std::path::Path;
 
@@ -21,6 +22,14 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 /// Writes a file of a run.
 pub fn write_in(dir: &RunDir, name: &str, bytes: &[u8]) -> Result<(), Failure> {
     dir.write(name, bytes).map_err(|e| plain(format!("{e}; earlier output is kept")))
+}
+
+/// Something that is done for a run, and may fail.
+pub type Task<'a> = &'a (dyn Fn() -> Result<(), Failure> + Sync);
+
+/// Does things side by side; returns the first failure in their order.
+pub fn do_all(tasks: &[Task]) -> Result<(), Failure> {
+    map_side_by_side(tasks, |task| task()).into_iter().collect()
 }
 
 /// Resolves the name of a program on the command line: `lathe` means `lathe.pcad`, unless

@@ -21,7 +21,7 @@ use crate::progress::{self, Ending};
 use crate::record::{
     counts, identity, record_failure, recorded, write_json, write_record, write_run,
 };
-use crate::reopening::page::write_page;
+use crate::reopening::page::{PagePicture, write_page};
 use crate::reopening::reopened::{PROGRAM, TRACES, TRAJECTORY};
 use crate::reopening::seen;
 use crate::stream::Streamed;
@@ -33,6 +33,7 @@ use pcadlang_inference::draws::{KernelStats, MOST_POINTS, Sink, SiteStats};
 use pcadlang_inference::{Callback, Callbacks, ChainResult, Evidence, KeptTraces, Trajectory};
 use pcadlang_library::scene::ImageValue;
 use pcadlang_library::{Model, Started};
+use pcadlang_numerics::platform::threads::both;
 use pcadlang_report::{
     ChainDraws, ChainFiles, Memory, Mode, Quantity, RunDir, align, mark_categories, modes,
     quantities, table, widen, zarr,
@@ -232,9 +233,20 @@ impl Fill<'_> {
         let started = self.sample(mode, interrupt)?;
         let sampled = self.ready.begun.elapsed();
         let interrupted = self.watched.progress.cancelled.load(Ordering::Relaxed);
-        let draws = self.write_draws(&started, interrupted)?;
-        let (outcome, more) = self.summarise(started, &draws, interrupted)?;
-        self.finish(outcome, more, sampled)
+        let draws = self.draws(&started, interrupted)?;
+        let points = started.chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
+        let mut step_sizes = vec![None; draws.len()];
+        for (c, i) in started.chains.iter().zip(&started.places) {
+            step_sizes[*i] = c.kernels.iter().find_map(|k| k.step_size);
+        }
+        // Small files: writing them is mostly waiting.
+        let (written, summarised) = both(
+            || self.write_draws(&draws, &step_sizes, &points),
+            || self.summarise(started, &draws, interrupted),
+        );
+        written?;
+        let (outcome, more, pictures) = summarised?;
+        self.finish(outcome, more, pictures, sampled)
     }
 
     /// Runs the chains; what is on the disk stays complete meanwhile.
@@ -270,12 +282,9 @@ impl Fill<'_> {
         Ok(model.started(results)?)
     }
 
-    /// Writes the states that were kept and the draws as arrays; chains that were not
-    /// interrupted end with the same draw.
-    fn write_draws(&self, ran: &Started, interrupted: bool) -> Result<Vec<ChainDraws>, Failure> {
+    /// Returns the draws; chains that were not interrupted end with the same one.
+    fn draws(&self, ran: &Started, interrupted: bool) -> Result<Vec<ChainDraws>, Failure> {
         let Fill { dir, watched, .. } = self;
-        write_traces(dir, &watched.kept)?;
-        write_lines(dir, TRAJECTORY, &watched.trajectory.all())?;
         let mut draws: Vec<ChainDraws> = watched.memories.iter().map(Memory::draws).collect();
         // A run that may be resumed keeps all its draws.
         let mut observed = ran.chains.iter().filter(|c| c.draws > 0).map(|c| &c.observed);
@@ -289,25 +298,32 @@ impl Fill<'_> {
         if !same {
             draws.iter_mut().for_each(ChainDraws::drop_pointwise);
         }
-        let points = ran.chains.first().map_or_else(Vec::new, |c| c.last.points(MOST_POINTS));
-        let mut step_sizes = vec![None; draws.len()];
-        for (c, i) in ran.chains.iter().zip(&ran.places) {
-            step_sizes[*i] = c.kernels.iter().find_map(|k| k.step_size);
-        }
-        zarr::write(dir.path(), &draws, &step_sizes, &points).map_err(|e| {
-            plain(format!("{}: {e}; earlier output is kept", dir.file(zarr::ZARR).display()))
-        })?;
         Ok(draws)
     }
 
+    /// Writes the states that were kept, and the draws as arrays.
+    fn write_draws(
+        &self,
+        draws: &[ChainDraws],
+        step_sizes: &[Option<f64>],
+        points: &[(String, f64)],
+    ) -> Result<(), Failure> {
+        let Fill { dir, watched, .. } = self;
+        write_traces(dir, &watched.kept)?;
+        write_lines(dir, TRAJECTORY, &watched.trajectory.all())?;
+        zarr::write(dir.path(), draws, step_sizes, points).map_err(|e| {
+            plain(format!("{}: {e}; earlier output is kept", dir.file(zarr::ZARR).display()))
+        })
+    }
+
     /// Summarises the draws, and writes pictures of the best state and of each mode. Returns
-    /// fields of `run.json` too.
+    /// fields of `run.json` and pictures for the page too.
     fn summarise(
         &self,
         ran: Started,
         draws: &[ChainDraws],
         interrupted: bool,
-    ) -> Result<(Outcome, Map<String, Value>), Failure> {
+    ) -> Result<(Outcome, Map<String, Value>, Vec<PagePicture>), Failure> {
         let Fill { job, ready, dir, watched, .. } = self;
         let Started { chains, mut warnings, .. } = ran;
         let (seed, image) = (job.sampling.seed, &ready.named_image);
@@ -392,7 +408,7 @@ impl Fill<'_> {
             seconds,
             interrupted,
         };
-        Ok((outcome, more))
+        Ok((outcome, more, drawn.pictures))
     }
 
     /// Writes the summary, the page, and last the record.
@@ -400,6 +416,7 @@ impl Fill<'_> {
         &self,
         outcome: Outcome,
         mut more: Map<String, Value>,
+        pictures: Vec<PagePicture>,
         sampled: Duration,
     ) -> Result<Outcome, Failure> {
         let o = &outcome;
@@ -414,7 +431,7 @@ impl Fill<'_> {
         more.insert("seconds".into(), json!(o.seconds));
         let state = if o.interrupted { "interrupted" } else { "done" };
         let run = recorded(self.record, state, Value::Object(more));
-        write_page(self.dir, &run, &summary, &o.quantities)?;
+        write_page(self.dir, &run, &summary, &o.quantities, pictures)?;
         write_run(self.dir, &run)?;
         Ok(outcome)
     }

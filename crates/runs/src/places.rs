@@ -5,10 +5,9 @@ use crate::failure::{Failure, plain};
 use crate::files::write_in;
 use crate::scene;
 use image::RgbImage;
-use image::imageops::{FilterType, resize};
 use pcadlang_inference::{BestSoFar, BestState};
 use pcadlang_library::Model;
-use pcadlang_report::pictures::{contact_sheet, png};
+use pcadlang_report::pictures::{contact_sheet, png, scaled};
 use pcadlang_report::{Mode, RunDir};
 use pcadlang_scene::vision::Photo;
 use pcadlang_workbench::session::over;
@@ -48,7 +47,7 @@ pub fn sized(picture: &RgbImage, side: u32) -> RgbImage {
     let scale = f64::from(side) / f64::from(picture.width().max(picture.height()).max(1));
     let [w, h] =
         [picture.width(), picture.height()].map(|v| ((f64::from(v) * scale) as u32).max(1));
-    resize(picture, w, h, FilterType::Triangle)
+    scaled(picture, w, h)
 }
 
 /// Writes `modes.png`, in the order of the table of modes, and `mode-N.png` for each mode, if there are several modes and the

@@ -10,7 +10,7 @@ use super::results::{self, finite};
 use super::runs::Runs;
 use super::server::Answer;
 use super::sessions::{OpenSession, Sessions, job_of, suited, without_data};
-use pcadlang_engine::lang::builtins::data::from_json;
+use pcadlang_engine::lang::builtins::data::Json;
 use pcadlang_engine::lang::value::Located;
 use pcadlang_engine::trace::{Stop, Trace};
 use pcadlang_library::scene::ImageValue;
@@ -25,6 +25,7 @@ use pcadlang_scene::render::{Camera, View};
 use pcadlang_workbench::session::{
     ChoiceRow, Joints, Layer, Marks, Request, Scores, observed_image, to_json,
 };
+use serde::Deserialize as _;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -310,7 +311,7 @@ impl App {
     }
 
     fn assign(&self, a: protocol::Assign) -> Result<Value, Failure> {
-        let value = from_json(a.value);
+        let Json(value) = Json::deserialize(a.value).map_err(|e| plain(e.to_string()))?;
         let id = a.session;
         let said = self.sessions.get(id)?.ask(move |open| {
             let after = open.session.assign(&a.address, value, a.drag)?;

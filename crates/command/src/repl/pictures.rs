@@ -3,9 +3,8 @@
 
 use super::super::args::Graphics;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
-use image::imageops::{FilterType, resize};
 use image::{Rgb, RgbImage};
-use pcadlang_report::pictures::png;
+use pcadlang_report::pictures::{png, scaled};
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::files;
 use pcadlang_workbench::session::ViewPicture;
@@ -57,9 +56,8 @@ pub fn shown(picture: &ViewPicture, graphics: Graphics) -> Result<String, Failur
         ));
     }
     let longer = pixels.width().max(pixels.height()).max(1);
-    let scaled = |x: u32| (x * LONGER_SIDE / longer).max(1);
-    let fitting =
-        || resize(&pixels, scaled(pixels.width()), scaled(pixels.height()), FilterType::Triangle);
+    let fit = |x: u32| (x * LONGER_SIDE / longer).max(1);
+    let fitting = || scaled(&pixels, fit(pixels.width()), fit(pixels.height()));
     Ok(match graphics {
         Graphics::Kitty => kitty(&encoded(&fitting())?),
         Graphics::Iterm => iterm(&encoded(&fitting())?),
@@ -117,7 +115,7 @@ fn half_blocks(picture: &RgbImage, columns: u32, full_colors: bool) -> String {
         return String::new();
     }
     let rows = (u64::from(columns) * u64::from(h)).div_ceil(2 * u64::from(w)).clamp(1, 1000) as u32;
-    let small = resize(picture, columns, 2 * rows, FilterType::Triangle);
+    let small = scaled(picture, columns, 2 * rows);
     let mut out = String::new();
     for y in 0..rows {
         let mut colors = None;

@@ -1,7 +1,7 @@
 //! From the network's outputs to boxes, as NanoDet's authors define them.
 
 use super::sample::Placed;
-use super::{BINS, CLASSES, FoundObject, SIDE, STRIDES};
+use super::{BINS, CLASSES, FoundObject, STRIDES};
 use crate::boxes::overlap;
 
 /// Of two boxes of one class with a larger intersection over union, the worse is dropped.
@@ -35,7 +35,7 @@ pub(super) fn decode(grids: &[[&[f32]; 2]; 3], placed: &Placed, least: f64) -> V
 
 /// Returns the box of a cell, clipped to the photograph; `None` if nothing of it is left.
 fn within(cell: usize, stride: usize, sides: &[f32], placed: &Placed) -> Option<[f64; 4]> {
-    let row = SIDE / stride;
+    let row = placed.input[0] / stride;
     let centre = [cell % row, cell / row].map(|i| (i as f64 + 0.5) * stride as f64 - 0.5);
     let (mut bounds, scale) = ([0.0; 4], placed.scale());
     for (k, (bound, bins)) in bounds.iter_mut().zip(sides.chunks_exact(BINS)).enumerate() {

@@ -1,6 +1,6 @@
 //! A photograph as the network's input.
 
-use super::View;
+use super::{SIDE, STRIDES, View};
 use pcadlang_scene::vision::Photo;
 
 /// The means and standard deviations of blue, green and red that the network was trained
@@ -11,9 +11,11 @@ const DEVIATIONS: [f32; 3] = [57.375, 57.12, 58.395];
 /// Where a photograph is among the samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Placed {
+    /// The width and height of the input, of whole cells.
+    pub input: [usize; 2],
     /// The sample of the photograph's upper left corner, across and down.
     pub origin: [usize; 2],
-    /// The number of samples that it covers.
+    /// The number of samples that it covers, across and down.
     pub samples: [usize; 2],
     /// Its size, pixels.
     pub size: [f64; 2],
@@ -28,25 +30,33 @@ impl Placed {
     }
 }
 
+/// The number of samples around a photograph in a smaller view, both sides together, at least.
+const MARGIN: usize = 32;
+
 /// Returns where a photograph is that is scaled so that its longer side takes up a view's part
-/// of `side` samples: a whole view has black at the right or below, a smaller one around it.
-pub(super) fn place(photo: &Photo, side: usize, view: View) -> Placed {
+/// of [`SIDE`] samples: at the upper left of a whole view, which is a square, and in the middle of
+/// a smaller one, which is hardly larger.
+pub(super) fn place(photo: &Photo, view: View) -> Placed {
     let size = [photo.width(), photo.height()].map(|n| n.max(1) as usize);
     let longer = size[0].max(size[1]) as f64;
-    let taken = view.part * side as f64;
-    let fit = |n: usize| (libm::round(n as f64 * taken / longer) as usize).clamp(1, side);
-    let margin = |n: usize| (0.5 * (1.0 - view.part) * n as f64 * side as f64 / longer) as usize;
-    Placed {
-        origin: size.map(margin),
-        samples: size.map(fit),
-        size: size.map(|n| n as f64),
-        mirrored: view.mirrored,
-    }
+    let taken = view.part * SIDE as f64;
+    let fit = |n: usize| (libm::round(n as f64 * taken / longer) as usize).clamp(1, SIDE);
+    let samples = size.map(fit);
+    let (input, origin) = match view.part < 1.0 {
+        true => {
+            let input = samples.map(|n| (n + MARGIN).next_multiple_of(STRIDES[2]));
+            (input, [0, 1].map(|i| (input[i] - samples[i]) / 2))
+        }
+        false => ([SIDE; 2], [0; 2]),
+    };
+    let size = size.map(|n| n as f64);
+    Placed { input, origin, samples, size, mirrored: view.mirrored }
 }
 
-/// Fills `out`, planes of blue, green and red of `side` x `side` samples, with a photograph so
-/// placed, the rest black. A sample is the mean of the area that it covers.
-pub(super) fn letterbox(photo: &Photo, side: usize, placed: &Placed, out: &mut [f32]) {
+/// Fills `out`, planes of blue, green and red samples, with a photograph so placed, the rest
+/// black. A sample is the mean of the area that it covers.
+pub(super) fn letterbox(photo: &Photo, placed: &Placed, out: &mut [f32]) {
+    let ([across, down], [left, top]) = (placed.input, placed.origin);
     let (width, height) = (photo.width() as usize, photo.height() as usize);
     let rgb = photo.rgb().as_raw();
     let (columns, rows) = (parts(width, placed.samples[0]), parts(height, placed.samples[1]));
@@ -65,12 +75,11 @@ pub(super) fn letterbox(photo: &Photo, side: usize, placed: &Placed, out: &mut [
         }
         for (i, sum) in line.iter().enumerate() {
             let i = if placed.mirrored { line.len() - 1 - i } else { i };
-            let p = (placed.origin[1] + j) * side + placed.origin[0] + i;
             // Blue first.
-            (0..3).for_each(|c| out[c * side * side + p] = sum[2 - c]);
+            (0..3).for_each(|c| out[(c * down + top + j) * across + left + i] = sum[2 - c]);
         }
     }
-    for (c, plane) in out.chunks_exact_mut(side * side).enumerate() {
+    for (c, plane) in out.chunks_exact_mut(across * down).enumerate() {
         plane.iter_mut().for_each(|v| *v = (*v - MEANS[c]) / DEVIATIONS[c]);
     }
 }
@@ -107,21 +116,31 @@ mod tests {
     use super::*;
     use image::{Rgb, RgbImage};
 
-    fn seen(rgb: RgbImage, side: usize, view: View) -> (Vec<f32>, Placed) {
+    /// Returns the input that shows a photograph in a view, as numbers of a channel, row and
+    /// column, from its upper left corner on.
+    fn seen(rgb: RgbImage, view: View) -> (impl Fn(usize, usize, usize) -> f32, Placed) {
         let photo = Photo::from_rgb(rgb).unwrap();
-        let (mut out, placed) = (vec![7.0; 3 * side * side], place(&photo, side, view));
-        letterbox(&photo, side, &placed, &mut out);
-        (out, placed)
+        let placed = place(&photo, view);
+        let ([across, down], [left, top]) = (placed.input, placed.origin);
+        let mut out = vec![7.0; 3 * across * down];
+        letterbox(&photo, &placed, &mut out);
+        let value = move |c: usize, j: usize, i: usize| {
+            out[(c * down + top + j) * across + left + i] * DEVIATIONS[c] + MEANS[c]
+        };
+        (value, placed)
+    }
+
+    /// A view in which a photograph's longer side takes up this number of samples.
+    fn taking(samples: usize, mirrored: bool) -> View {
+        View { part: samples as f64 / SIDE as f64, mirrored }
     }
 
     #[test]
     fn samples_are_means_of_areas_and_the_rest_is_black() {
         // Five columns on two samples: 1, 1, 1/2 and 1/2, 1, 1.
         let rgb = RgbImage::from_fn(5, 2, |x, y| Rgb([10 * x as u8, 100 * y as u8, 7]));
-        let (out, placed) = seen(rgb, 2, View::WHOLE);
-        assert_eq!((placed.scale(), placed.origin), ([2.0 / 5.0, 1.0 / 2.0], [0, 0]));
-        let value =
-            |c: usize, j: usize, i: usize| out[(c * 2 + j) * 2 + i] * DEVIATIONS[c] + MEANS[c];
+        let (value, placed) = seen(rgb, taking(2, false));
+        assert_eq!((placed.scale(), placed.input), ([2.0 / 5.0, 1.0 / 2.0], [64, 64]));
         for (c, expected) in [(0, [7.0, 7.0]), (1, [50.0, 50.0]), (2, [8.0, 32.0])] {
             for i in 0..2 {
                 assert!((value(c, 0, i) - expected[i]).abs() < 1e-4, "{c} {i}");
@@ -133,25 +152,24 @@ mod tests {
     #[test]
     fn small_photographs_are_interpolated() {
         let rgb = RgbImage::from_fn(1, 2, |_, y| Rgb([80 * y as u8; 3]));
-        let (out, placed) = seen(rgb, 4, View::WHOLE);
+        let (value, placed) = seen(rgb, taking(4, false));
         assert_eq!(placed.scale(), [2.0, 2.0]);
-        let column: Vec<f32> = (0..4).map(|j| out[4 * j] * DEVIATIONS[0] + MEANS[0]).collect();
-        for (got, expected) in column.iter().zip([0.0, 20.0, 60.0, 80.0]) {
-            assert!((got - expected).abs() < 1e-4, "{column:?}");
+        for (j, expected) in [0.0, 20.0, 60.0, 80.0].into_iter().enumerate() {
+            assert!((value(0, j, 0) - expected).abs() < 1e-4, "{j}");
         }
     }
 
     #[test]
-    fn smaller_views_are_in_the_middle_and_may_be_mirrored() {
-        let rgb = RgbImage::from_fn(4, 2, |x, _| Rgb([10 + 20 * x as u8; 3]));
-        let view = View { part: 0.5, mirrored: true };
-        let (out, placed) = seen(rgb, 8, view);
-        assert_eq!((placed.origin, placed.scale()), ([2, 1], [1.0, 1.0]));
-        let is = |j: usize, wanted: [f32; 8]| {
-            let row = out[8 * j..][..8].iter().map(|v| v * DEVIATIONS[0] + MEANS[0]);
-            row.zip(wanted).all(|(a, b)| (a - b).abs() < 1e-4)
-        };
-        assert!(is(1, [0.0, 0.0, 70.0, 50.0, 30.0, 10.0, 0.0, 0.0]));
-        assert!(is(3, [0.0; 8]));
+    fn smaller_views_are_hardly_larger_than_photographs_and_may_be_mirrored() {
+        let rgb = RgbImage::from_fn(400, 100, |x, _| Rgb([(x / 2) as u8; 3]));
+        let (value, placed) = seen(rgb, taking(200, true));
+        assert_eq!((placed.input, placed.samples), ([256, 96], [200, 50]));
+        assert_eq!(placed.origin, [28, 23]);
+        for (i, expected) in [(0, 199.0), (99, 100.0), (199, 0.0), (200, 0.0)] {
+            assert!((value(0, 20, i) - expected).abs() < 1e-3, "{i}: {}", value(0, 20, i));
+        }
+        assert!(value(0, 50, 0).abs() < 1e-4, "black below");
+        let (_, whole) = seen(RgbImage::new(400, 300), View::WHOLE);
+        assert_eq!((whole.input, whole.origin), ([416, 416], [0, 0]));
     }
 }

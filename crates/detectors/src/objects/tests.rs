@@ -2,7 +2,7 @@
 
 use super::boxes::{best, decode};
 use super::sample::Placed;
-use super::{BINS, CLASSES, FoundObject, ObjectFinder, ObjectOptions, View, networks};
+use super::{BINS, CLASSES, FoundObject, ObjectFinder, ObjectOptions, View};
 use pcadlang_scene::vision::{Limits, Photo, photo};
 
 /// Outputs of all strides without an object, and with equal probabilities of all distances.
@@ -18,8 +18,13 @@ fn certain(sides: &mut [f32], cell: usize, side: usize, bin: usize) {
 fn decoded(outputs: &[[Vec<f32>; 2]; 3], least: f64) -> Vec<FoundObject> {
     let grids = [0, 1, 2].map(|k| [&outputs[k][0][..], &outputs[k][1][..]]);
     // Half a sample to a pixel across, a whole one down.
-    let placed =
-        Placed { origin: [0; 2], samples: [350, 400], size: [700.0, 400.0], mirrored: false };
+    let placed = Placed {
+        input: [416; 2],
+        origin: [0; 2],
+        samples: [350, 400],
+        size: [700.0, 400.0],
+        mirrored: false,
+    };
     decode(&grids, &placed, least)
 }
 
@@ -72,7 +77,8 @@ fn found(photo: &Photo) -> Vec<FoundObject> {
 }
 
 fn seen(photo: &Photo, view: View) -> Vec<FoundObject> {
-    networks::finder().unwrap().find(photo, view, &ObjectOptions::default())
+    let options = ObjectOptions::default();
+    ObjectFinder::INCLUDED.find_in_views(photo, &[view], &options).unwrap()
 }
 
 #[test]
@@ -113,8 +119,14 @@ fn nothing_is_found_where_there_is_nothing() {
 #[test]
 fn a_network_for_something_else_is_refused() {
     let (json, weights) = crate::nn::tests::graph::small().files();
-    let other = ObjectFinder::new(&json, weights.leak()).unwrap_err().to_string();
+    let refused = |model, weights| {
+        let photo = Photo::from_rgb(image::RgbImage::new(9, 9)).unwrap();
+        let finder = ObjectFinder::new(model, weights);
+        let found = finder.find_in_views(&photo, &[View::WHOLE], &ObjectOptions::default());
+        found.unwrap_err().to_string()
+    };
+    let other = refused(json.leak(), weights.leak());
     assert!(other.contains("it is not a detector of objects"), "{other}");
-    let swapped = ObjectFinder::new(pcadlang_nanodet::WEIGHTS, pcadlang_nanodet::MODEL);
-    assert!(swapped.unwrap_err().to_string().contains("not a TensorFlow.js graph model"));
+    let swapped = refused(pcadlang_nanodet::WEIGHTS, pcadlang_nanodet::MODEL);
+    assert!(swapped.contains("not a TensorFlow.js graph model"), "{swapped}");
 }

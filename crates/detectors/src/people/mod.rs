@@ -23,11 +23,11 @@ pub use person::{Hypothesis, Landmark, Person};
 
 use crate::boxes::{around, overlap};
 use crate::nn::{Memory, Network, NetworkError};
-use crate::objects::{FoundObject, VIEWS, View as ObjectView};
+use crate::objects::{FoundObject, View as ObjectView};
 use area::Area;
 use consensus::{ONE, PersonBox, Run, by_person, consensus, prominence, same, seen, sure};
 use landmarks::View;
-use pcadlang_numerics::platform::threads::side_by_side;
+use pcadlang_numerics::platform::threads::{both, side_by_side};
 use pcadlang_scene::vision::Photo;
 use std::thread::available_parallelism;
 use window::Window;
@@ -46,7 +46,13 @@ const IN_COMPANY: f64 = 0.75;
 const LARGE: f64 = 0.6;
 
 /// The views of a photograph in which boxes of people are looked for.
-pub const VIEWS_OF_PEOPLE: &[ObjectView] = VIEWS.split_at(4).0;
+pub const VIEWS_OF_PEOPLE: &[ObjectView] = &{
+    const fn seen(part: f64) -> [ObjectView; 2] {
+        [ObjectView { part, mirrored: false }, ObjectView { part, mirrored: true }]
+    }
+    let ([a, b], [c, d]) = (seen(1.0), seen(0.67));
+    [a, b, c, d]
+};
 
 /// Where to look for people.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,10 +102,8 @@ impl PeopleFinder {
         detection: &'static [u8],
         landmarks: &'static [u8],
     ) -> Result<PeopleFinder, NetworkError> {
-        let finder = PeopleFinder {
-            detection: Network::read(detection)?,
-            landmarks: Network::read(landmarks)?,
-        };
+        let (landmarks, detection) = both(|| Network::read(landmarks), || Network::read(detection));
+        let finder = PeopleFinder { detection: detection?, landmarks: landmarks? };
         detection::check(&finder.detection)?;
         landmarks::check(&finder.landmarks)?;
         Ok(finder)

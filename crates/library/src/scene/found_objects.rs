@@ -1,7 +1,7 @@
 //! The objects in a photograph, as values: a thin layer over [`pcadlang_detectors::objects`].
 
 use super::{IMAGE, ImageValue, native};
-use pcadlang_detectors::objects::{CLASSES, FoundObject, ObjectOptions, View, networks};
+use pcadlang_detectors::objects::{CLASSES, FoundObject, ObjectFinder, ObjectOptions, View};
 use pcadlang_engine::lang::builtins::{Args, Default, Domain, Row, Type, arg, int, num};
 use pcadlang_engine::lang::error::{Fault, FaultKind};
 use pcadlang_engine::lang::value::Value;
@@ -48,10 +48,9 @@ pub(super) const TABLE: &[Row] = &[native(
 pub(super) fn found(image: &ImageValue, views: &[View]) -> Result<Arc<Vec<FoundObject>>, Fault> {
     image.prepared().get(Viewed(views.to_vec()), |Viewed(views)| {
         let Some(photo) = image.as_photo() else { return Ok(Vec::new()) };
-        let fault = |why: String| Fault::new(FaultKind::Other, format!("scene.objects: {why}"));
         let options = ObjectOptions { least: LEAST, most: usize::MAX };
-        let finder = networks::finder().map_err(fault)?;
-        Ok(finder.find_in_views(photo, views, &options))
+        let found = ObjectFinder::INCLUDED.find_in_views(photo, views, &options);
+        found.map_err(|e| Fault::new(FaultKind::Other, format!("scene.objects: {e}")))
     })
 }
 

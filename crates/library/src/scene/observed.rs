@@ -73,6 +73,10 @@ impl Prepared {
     }
 }
 
+/// The key of contours to look at.
+#[derive(Clone, Copy, PartialEq)]
+struct Shown;
+
 /// A search for people.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PeopleKey {
@@ -180,6 +184,20 @@ impl ImageValue {
     /// If the detector chosen for it fails.
     pub fn map(&self) -> Result<&ContourMap, Fault> {
         self.picture.map()
+    }
+
+    /// Returns contours to look at: those that programs have used or, if they have used none,
+    /// those of the built-in detector, found once. `None` without a photograph.
+    pub fn contours_shown(&self) -> Option<ContourMap> {
+        let found = || {
+            let found = self.prepared().get(Shown, |_| {
+                // Of a copy, so that they do not count as used.
+                let copy = self.shown().map(|photo| ImageValue::photo(photo.clone()));
+                Ok(copy.and_then(|image| image.map().ok().cloned()))
+            });
+            found.ok()?.as_ref().clone()
+        };
+        self.seen().or_else(found)
     }
 
     /// Returns the contours that programs have used; `None` if they have used none.

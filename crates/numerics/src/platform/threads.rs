@@ -82,9 +82,21 @@ pub fn map_side_by_side<I: Sync, T: Send>(items: &[I], one: impl Fn(&I) -> T + S
     done.into_iter().map(|(_, result)| result).collect()
 }
 
+/// Does two things, the first on a thread of its own.
+pub fn both<A: Send, B>(one: impl FnOnce() -> A + Send, other: impl FnOnce() -> B) -> (A, B) {
+    #[cfg(not(target_family = "wasm"))]
+    return std::thread::scope(|scope| {
+        let one = scope.spawn(one);
+        let other = other();
+        (one.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), other)
+    });
+    #[cfg(target_family = "wasm")]
+    (one(), other())
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{in_parallel, map_side_by_side};
+    use super::{both, in_parallel, map_side_by_side};
 
     #[test]
     fn results_are_in_order_on_any_number_of_threads() {
@@ -95,5 +107,6 @@ mod tests {
         let items: Vec<u64> = (0..1000).collect();
         assert_eq!(map_side_by_side(&items, |i| i * i), expected);
         assert!(map_side_by_side(&[], |i: &u64| i * i).is_empty());
+        assert_eq!(both(|| 1, || "two"), (1, "two"));
     }
 }

@@ -6,14 +6,18 @@
 //! buffers count as background, so no input panics.
 
 mod layers;
+mod scale;
 mod sheet;
 mod strokes;
 mod surface;
 
 pub use layers::{depth, normals, parts, residuals};
+pub use scale::scaled;
 pub use sheet::contact_sheet;
 pub use strokes::{DETECTED, OF_SCENE, contour_map, contours, dots, limbs};
 pub use surface::{frequency, mask, overlaid, overlay, shaded};
+
+use jpeg_encoder::{ColorType, Encoder, EncodingError, SamplingFactor};
 
 /// Pictures are enlarged until their longer side has this many pixels.
 pub const LONGER_SIDE: u32 = 768;
@@ -42,14 +46,24 @@ where
     Ok(bytes)
 }
 
-/// Encodes a picture as a JPEG file of a quality from 1 to 100.
+/// Encodes a picture as a JPEG file of a quality from 1 to 100: with one channel if it is grey,
+/// else with colours at half the resolution.
 ///
 /// # Errors
-/// Returns an error if the picture has no pixels.
-pub fn jpeg(picture: &image::RgbImage, quality: u8) -> Result<Vec<u8>, image::ImageError> {
+/// Returns an error if the picture has no pixels, or a side of more than 65,535.
+pub fn jpeg(picture: &image::RgbImage, quality: u8) -> Result<Vec<u8>, EncodingError> {
     let mut bytes = Vec::new();
-    let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, quality);
-    picture.write_with_encoder(encoder)?;
+    let mut encoder = Encoder::new(&mut bytes, quality);
+    encoder.set_sampling_factor(SamplingFactor::F_2_2);
+    // A side of 0 is refused.
+    let [width, height] =
+        [picture.width(), picture.height()].map(|n| u16::try_from(n).unwrap_or(0));
+    if picture.pixels().all(|p| p.0 == [p.0[0]; 3]) {
+        let grey: Vec<u8> = picture.pixels().map(|p| p.0[0]).collect();
+        encoder.encode(&grey, width, height, ColorType::Luma)?;
+    } else {
+        encoder.encode(picture.as_raw(), width, height, ColorType::Rgb)?;
+    }
     Ok(bytes)
 }
 
@@ -71,8 +85,18 @@ mod tests {
         assert_eq!(picture_size(1, 100_000), (1, 100_000));
         assert_eq!(picture_size(0, 0), (1, 1));
         let picture = image::RgbImage::from_fn(5, 3, |x, y| image::Rgb([x as u8, y as u8, 7]));
+        assert!(jpeg(&image::RgbImage::new(0, 3), 90).is_err());
         let back = image::load_from_memory(&png(&picture).unwrap()).unwrap().to_rgb8();
         assert_eq!(back, picture);
+        for (picture, color) in [
+            (picture, image::ColorType::Rgb8),
+            (image::RgbImage::from_pixel(9, 4, image::Rgb([90; 3])), image::ColorType::L8),
+        ] {
+            let back = image::load_from_memory(&jpeg(&picture, 90).unwrap()).unwrap();
+            assert_eq!((back.color(), back.width()), (color, picture.width()));
+            let near = |(a, b): (&u8, &u8)| a.abs_diff(*b) < 9;
+            assert!(back.to_rgb8().iter().zip(picture.iter()).all(near));
+        }
         assert_eq!(mix([0, 100, 200], [100.0, 100.0, 300.0], 0.5), [50, 100, 228]);
     }
 }

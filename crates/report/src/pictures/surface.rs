@@ -1,9 +1,9 @@
 //! The surface of a draw: shaded, over a photograph, as a mask, and how often draws cover
 //! each pixel.
 
+use super::scale::scaled;
 use super::strokes::draw_strokes;
 use super::{LONGER_SIDE, mix};
-use image::imageops::{FilterType, resize};
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use pcadlang_scene::render::{ContourSlice, Frame};
 
@@ -54,7 +54,7 @@ pub fn overlay(photo: Option<&RgbImage>, drawn: &Frame, strokes: &ContourSlice) 
     let mut out = blended(photo, drawn);
     let size = super::picture_size(drawn.width, drawn.height);
     if drawn.width > 0 && drawn.height > 0 && drawn.width.max(drawn.height) < LONGER_SIDE {
-        out = resize(&out, size.0, size.1, FilterType::Triangle);
+        out = scaled(&out, size.0, size.1);
     }
     draw_strokes(&mut out, strokes, STROKE);
     out
@@ -70,8 +70,7 @@ pub fn overlaid(photo: Option<&RgbImage>, drawn: &Frame, strokes: &ContourSlice)
 /// Draws the surface over the photograph, half transparent.
 fn blended(photo: Option<&RgbImage>, drawn: &Frame) -> RgbImage {
     let mut out = match photo.filter(|p| p.width() > 0 && p.height() > 0) {
-        Some(p) if p.dimensions() == (drawn.width, drawn.height) => p.clone(),
-        Some(p) => resize(p, drawn.width, drawn.height, FilterType::CatmullRom),
+        Some(p) => scaled(p, drawn.width, drawn.height),
         None => RgbImage::from_pixel(drawn.width, drawn.height, Rgb([245; 3])),
     };
     for (i, p) in out.pixels_mut().enumerate() {

@@ -47,13 +47,17 @@ const MODES: (&str, &str, bool) = (
     false,
 );
 
+/// The name of a picture in a folder, and its file as it is on the page.
+pub type PagePicture = (&'static str, Vec<u8>);
+
 /// Writes the page of a folder. `run` and `summary` are the contents of `run.json` and
-/// `summary.json`, which need not be written yet.
+/// `summary.json`, which need not be written yet; `drawn` are pictures that need not be read.
 pub fn write_page(
     dir: &RunDir,
     run: &Value,
     summary: &Value,
     quantities: &[Quantity],
+    drawn: Vec<PagePicture>,
 ) -> Result<(), Failure> {
     let modes: Vec<Mode> = list(&summary["modes"]);
     let mode_pictures: Vec<_> =
@@ -69,7 +73,11 @@ pub fn write_page(
         facts: facts(run),
         command: &command(run),
         settings: settings(run),
-        pictures: pictures(dir, modes.len() > 1 && mode_pictures.iter().all(Option::is_none)),
+        pictures: pictures(
+            dir,
+            modes.len() > 1 && mode_pictures.iter().all(Option::is_none),
+            drawn,
+        ),
         quantities,
         modes: &modes,
         mode_pictures,
@@ -155,18 +163,21 @@ fn settings(run: &Value) -> Vec<(&'static str, String)> {
 }
 
 /// Returns the pictures in a folder, grouped by what is to be compared side by side.
-fn pictures(dir: &RunDir, modes: bool) -> Vec<Vec<Figure<'static>>> {
+fn pictures(dir: &RunDir, modes: bool, mut drawn: Vec<PagePicture>) -> Vec<Vec<Figure<'static>>> {
     let mut groups =
         vec![vec![PHOTO], vec![OVER], vec![JOINTS], vec![COVERED], vec![EDGES, CONTOURS]];
     groups.extend(modes.then(|| vec![MODES]));
-    let of = |(name, caption, lines): (&str, &'static str, bool)| {
+    let mut of = |(name, caption, lines): (&str, &'static str, bool)| {
+        if let Some(i) = drawn.iter().position(|(drawn, _)| *drawn == name) {
+            return Some(Figure { caption, file: drawn.swap_remove(i).1, lines });
+        }
         let file = std::fs::read(dir.file(name)).ok()?;
         // Lines stay sharp, everything else is a photograph or lies over one.
         let file = if lines { fitted(file)? } else { sized(file)? };
         Some(Figure { caption, file, lines })
     };
     let found =
-        groups.into_iter().map(|group| group.into_iter().filter_map(of).collect::<Vec<_>>());
+        groups.into_iter().map(|group| group.into_iter().filter_map(&mut of).collect::<Vec<_>>());
     found.filter(|group| !group.is_empty()).collect()
 }
 
@@ -182,15 +193,24 @@ fn fitted(file: Vec<u8>) -> Option<Vec<u8>> {
     png(&places::sized(&large, LARGEST)).ok()
 }
 
-/// As [`fitted`], as a JPEG file if that is smaller: pictures over a photograph then take a
-/// fifth of the space.
+/// As [`fitted`], as a JPEG file if that is smaller.
 fn sized(file: Vec<u8>) -> Option<Vec<u8>> {
-    let file = fitted(file)?;
     if file.starts_with(b"\xff\xd8") {
-        return Some(file);
+        return fitted(file);
     }
-    let bytes = jpeg(&image::load_from_memory(&file).ok()?.to_rgb8(), QUALITY).ok()?;
-    Some(if bytes.len() < file.len() { bytes } else { file })
+    let picture = image::load_from_memory(&file).ok()?.to_rgb8();
+    Some(on_page(&picture, file))
+}
+
+/// Returns the file of a picture as it is on a page: of at most its maximum size, as a JPEG file
+/// if that is smaller: pictures over a photograph then take a fifth of the space.
+pub fn on_page(picture: &RgbImage, file: Vec<u8>) -> Vec<u8> {
+    let large = picture.width().max(picture.height()) > LARGEST;
+    let small = large.then(|| places::sized(picture, LARGEST));
+    match jpeg(small.as_ref().unwrap_or(picture), QUALITY) {
+        Ok(bytes) if large || bytes.len() < file.len() => bytes,
+        _ => file,
+    }
 }
 
 /// Rebuilds the page of a run.
@@ -223,7 +243,7 @@ pub fn written(a: &Report) -> Result<PathBuf, Failure> {
     rename(&mut quantities, names.into_iter().map(String::as_str));
     let known = &summary["quantities"];
     mark_categories(&mut quantities, |name| known[name]["most_frequent"].is_object());
-    write_page(&dir, &run, &summary, &quantities)?;
+    write_page(&dir, &run, &summary, &quantities, Vec::new())?;
     Ok(dir.file(PAGE))
 }
 

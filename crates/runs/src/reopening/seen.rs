@@ -4,13 +4,13 @@
 use crate::failure::{Failure, plain};
 use crate::files::write_in;
 use crate::places::sized;
+use crate::reopening::page::{PagePicture, on_page};
 use image::RgbImage;
 use image::imageops::crop_imm;
 use pcadlang_engine::lang::value::Located;
 use pcadlang_library::scene::ImageValue;
 use pcadlang_report::RunDir;
 use pcadlang_report::pictures::{self, DETECTED, LONGER_SIDE, OF_SCENE, jpeg, png};
-use pcadlang_workbench::session::photo_contours;
 
 /// The maximum longer side of the photograph, in pixels.
 const LARGEST: u32 = 1024;
@@ -19,31 +19,31 @@ const QUALITY: u8 = 90;
 /// The margin around the joints, as a fraction of their extent.
 const MARGIN: f64 = 0.15;
 
-/// Writes, for a picture of this size, `photo.jpg`, its contours as `photo_contours.png`, and
-/// `joints.png` if any were detected.
-pub fn show_seen(
+/// Writes a photograph at the size of pictures, `photo.jpg`.
+pub fn show_photo(dir: &RunDir, photo: &RgbImage) -> Result<(), Failure> {
+    let (w, h) = pictures::picture_size(photo.width(), photo.height());
+    let small = sized(photo, w.max(h).min(LARGEST));
+    let bytes = jpeg(&small, QUALITY).map_err(|e| plain(e.to_string()))?;
+    write_in(dir, "photo.jpg", &bytes)
+}
+
+/// Writes `joints.png`, if any were detected; returns it as it is on a page.
+pub fn show_joints(
     dir: &RunDir,
-    image: &ImageValue,
-    (width, height): (u32, u32),
+    photo: &RgbImage,
     located: &[Located],
-) -> Result<(), Failure> {
-    let told = |e: image::ImageError| plain(e.to_string());
-    if let (Some(photo), Some(shown)) = (image.as_photo(), image.shown()) {
-        let (w, h) = pictures::picture_size(width, height);
-        let small = sized(shown.rgb(), w.max(h).min(LARGEST));
-        let bytes = jpeg(&small, QUALITY).map_err(told)?;
-        write_in(dir, "photo.jpg", &bytes)?;
-        if let Some(joints) = joints(photo.rgb(), located) {
-            write_in(dir, "joints.png", &png(&joints).map_err(told)?)?;
-        }
-    }
-    match photo_contours(image) {
-        Some(map) => {
-            let lines = pictures::contour_map(width, height, &map);
-            write_in(dir, "photo_contours.png", &png(&lines).map_err(told)?)
-        }
-        None => Ok(()),
-    }
+) -> Result<Option<PagePicture>, Failure> {
+    let Some(joints) = joints(photo, located) else { return Ok(None) };
+    let bytes = png(&joints).map_err(|e| plain(e.to_string()))?;
+    write_in(dir, "joints.png", &bytes)?;
+    Ok(Some(("joints.png", on_page(&joints, bytes))))
+}
+
+/// Writes the contours of what was observed as `photo_contours.png`, of this size.
+pub fn show_contours(dir: &RunDir, image: &ImageValue, size: (u32, u32)) -> Result<(), Failure> {
+    let Some(map) = image.contours_shown() else { return Ok(()) };
+    let lines = pictures::contour_map(size.0, size.1, &map);
+    write_in(dir, "photo_contours.png", &png(&lines).map_err(|e| plain(e.to_string()))?)
 }
 
 /// Warns of observed data that do not constrain the scene: a photograph without contours,

@@ -31,8 +31,7 @@ pub use complete::Completion;
 pub use files::{exported, exported_operand};
 pub use limbs::Joints;
 pub use picture::{
-    Layer, ViewPicture, as_view, detected, observed_image, over, photo_contours, picture_operand,
-    view,
+    Layer, ViewPicture, as_view, detected, observed_image, over, picture_operand, reduced, view,
 };
 pub use reply::{Reply, Request};
 pub use state::Session;

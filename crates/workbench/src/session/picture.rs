@@ -5,14 +5,13 @@ use super::reply::Reply;
 use super::state::Session;
 use crate::failure::{Failure, plain};
 use image::RgbImage;
-use image::imageops::{FilterType, resize};
 use pcadlang_engine::lang::code::{Code, Operand};
 use pcadlang_engine::lang::value::{Located, Value};
 use pcadlang_engine::trace::{Draws, Trace};
 use pcadlang_library::scene::{ImageValue, SolidValue, ViewValue};
 use pcadlang_report::pictures;
 use pcadlang_scene::render::{Camera, View};
-use pcadlang_scene::vision::{ContourMap, Photo};
+use pcadlang_scene::vision::Photo;
 use pcadlang_syntax::diag::nearest;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -48,16 +47,8 @@ impl ViewPicture {
 /// Draws the surface of a view with its contours and landmarks, over a photograph if
 /// there is one. The picture has the given size, enlarged by [`pictures::picture_size`].
 pub fn over(view: &Arc<View>, photo: Option<&RgbImage>, (width, height): (u32, u32)) -> RgbImage {
-    let large = pictures::picture_size(width, height);
-    let contours = view.contours(width.max(height));
-    let side = large.0.max(large.1);
-    let picture = match side == width.max(height) {
-        true => view.frame(side),
-        // Of a view apart, so that the larger picture is not kept.
-        false => View::new(view.solid().clone(), *view.camera()).frame(side),
-    };
-    let mut out = pictures::overlay(photo, &picture, &contours.slice());
-    drop(picture);
+    let size = width.max(height);
+    let mut out = pictures::overlay(photo, &view.frame(size), &view.contours(size).slice());
     let marked = ViewValue(Arc::clone(view));
     let points: Vec<[f64; 2]> = marked.landmarks(width, height).filter_map(|(_, at)| at).collect();
     pictures::dots(&mut out, (width, height), &points, pictures::OF_SCENE);
@@ -247,7 +238,10 @@ impl Layer {
         size: u32,
     ) -> Result<RgbImage, Failure> {
         let photo = image.and_then(ImageValue::as_photo);
-        let seen = || image.and_then(photo_contours).ok_or_else(|| plain("there is no photograph"));
+        let seen = || {
+            let map = image.and_then(ImageValue::contours_shown);
+            map.ok_or_else(|| plain("there is no photograph"))
+        };
         let camera = view.camera();
         let of = photo.map_or((camera.width, camera.height), |p| (p.width(), p.height()));
         let (width, height) = scaled(of, size);
@@ -264,7 +258,7 @@ impl Layer {
                 detected(&mut out, located, size);
                 out
             }
-            Layer::Photo => resize(needed()?.rgb(), width, height, FilterType::Triangle),
+            Layer::Photo => pictures::scaled(needed()?.rgb(), width, height),
             Layer::Scene => pictures::shaded(&frame()),
             Layer::Depth => pictures::depth(&frame()),
             Layer::Normals => pictures::normals(&frame()),
@@ -283,7 +277,7 @@ impl Layer {
                     return Err(plain("no joints were found in the photograph"));
                 }
                 let mut out = match photo {
-                    Some(p) => resize(p.rgb(), width, height, FilterType::Triangle),
+                    Some(p) => pictures::scaled(p.rgb(), width, height),
                     None => RgbImage::new(width, height),
                 };
                 detected(&mut out, located, (width, height));
@@ -298,12 +292,16 @@ impl Layer {
     }
 }
 
-/// Returns the contours of a photograph, to look at: those that the program compared with
-/// or, if it used none, those of the built-in detector. `None` if there is no photograph.
-pub fn photo_contours(image: &ImageValue) -> Option<ContourMap> {
-    // On a copy, so that contours detected here do not count as used.
-    let found = || ImageValue::photo(image.shown()?.clone()).map().ok().cloned();
-    image.seen().or_else(found)
+/// Returns what was observed at the size of layers and with its contours, for several of them:
+/// each would scale the photograph, and look for contours if the program used none. `None` without
+/// either.
+pub fn reduced(image: &ImageValue, size: u32) -> Option<ImageValue> {
+    let map = image.contours_shown()?;
+    let photo = image.shown().map(|p| {
+        let (width, height) = scaled((p.width(), p.height()), size);
+        Photo::from_rgb(pictures::scaled(p.rgb(), width, height))
+    });
+    Some(ImageValue::contours(map, photo.and_then(Result::ok)))
 }
 
 /// Returns a size with this longer side.

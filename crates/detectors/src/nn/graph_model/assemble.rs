@@ -57,6 +57,10 @@ pub(super) struct Assembly<'a> {
     pub shapes: Vec<Vec<usize>>,
     pub constants: HashMap<usize, Vec<f32>>,
     pub input: Option<usize>,
+    /// The height and width of the input, if they are not the model's.
+    pub image: Option<[usize; 2]>,
+    /// By what the model's heights and widths are then multiplied and divided.
+    scale: Option<[[usize; 2]; 2]>,
     pub effort: Effort,
     /// The number of constant elements that were read or stored.
     read: usize,
@@ -155,6 +159,7 @@ impl<'a> Assembly<'a> {
                 let from = Size::of(&self.shapes[x]).ok_or("its input is not an image")?;
                 let to = sizes(integers(inputs, 1)?, 1)?;
                 let [height, width] = to[..] else { return Err("expected two sizes".into()) };
+                let [height, width] = self.scaled([height, width])?;
                 let alignment = match (node.flag("half_pixel_centers"), node.flag("align_corners"))
                 {
                     (true, false) => Alignment::HalfPixels,
@@ -243,12 +248,30 @@ impl<'a> Assembly<'a> {
     }
 
     fn placeholder(&mut self, node: &Node) -> Checked<View> {
-        let shape = node.shape("shape").ok_or("it has no fixed shape")?;
+        let mut shape = node.shape("shape").ok_or("it has no fixed shape")?;
+        if let Some(image) = self.image {
+            let [_, _, height, width] = &mut shape[..] else {
+                return Err("it is not an image".into());
+            };
+            self.scale = Some([image, [*height, *width]]);
+            [*height, *width] = image;
+        }
         let view = self.tensor(shape)?;
         if self.input.replace(view.tensor).is_some() {
             return Err("the network has more than one input".into());
         }
         Ok(view)
+    }
+
+    /// Returns a height and width of the model for the input as it is.
+    fn scaled(&self, size: [usize; 2]) -> Checked<[usize; 2]> {
+        let Some([to, from]) = self.scale else { return Ok(size) };
+        let mut scaled = [0; 2];
+        for (i, scaled) in scaled.iter_mut().enumerate() {
+            let product = size[i].checked_mul(to[i]).filter(|n| from[i] > 0 && n % from[i] == 0);
+            *scaled = product.ok_or("its input cannot have this size")? / from[i];
+        }
+        Ok(scaled)
     }
 
     fn add(&mut self, a: &View, b: &View) -> Checked<View> {

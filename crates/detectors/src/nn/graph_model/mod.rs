@@ -17,14 +17,21 @@ impl<'a> Network<'a> {
     /// Reads the network of a TensorFlow.js graph model: the bytes of its `model.json`, and
     /// those of its files of weights, one after the other. Inputs and outputs have the
     /// model's dimensions, in the model's order; the outputs are those of its signature.
+    /// `image` is the height and width of another input, if channels come first, with which
+    /// sizes to which images are scaled grow in proportion.
     ///
     /// # Errors
     /// If the files are not of the format or do not belong together, or the network has
     /// unsupported operators or is too large.
-    pub fn read_graph_model(json: &[u8], weights: &'a [u8]) -> Result<Network<'a>, NetworkError> {
+    pub fn read_graph_model(
+        json: &[u8],
+        weights: &'a [u8],
+        image: Option<[usize; 2]>,
+    ) -> Result<Network<'a>, NetworkError> {
         let (graph, manifest) = Model::parse(json)?.graph()?;
         let constants = constants::read(manifest, weights)?;
         let mut assembly = Assembly::default();
+        assembly.image = image;
         let mut values: Vec<Vec<Value>> = vec![Vec::new(); graph.nodes.len()];
         for index in graph.order()? {
             let node = &graph.nodes[index];

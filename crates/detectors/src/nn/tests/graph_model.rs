@@ -6,7 +6,7 @@ use serde_json::json;
 
 fn read(graph: &Graph) -> Result<Network<'static>, NetworkError> {
     let (json, weights) = graph.files();
-    Network::read_graph_model(&json, weights.leak())
+    Network::read_graph_model(&json, weights.leak(), None)
 }
 
 fn run(graph: &Graph, input: &[f32]) -> Vec<Vec<f32>> {
@@ -29,6 +29,24 @@ fn a_model_is_read_and_run() {
     // What else reads a result gets it without the bias.
     let shared = Graph { outputs: vec!["y", "c"], ..small() };
     assert_eq!(run(&shared, &[3.0, 1.0, 4.0]), [[1.5, -1.625], [1.0, -7.0]]);
+}
+
+#[test]
+fn an_image_may_have_another_size_than_the_model_s() {
+    let graph = Graph::new(&[1, 1, 2, 4], &["y"])
+        .transposed("t", "x", &[0, 2, 3, 1])
+        .integers("size", &[2], &[4, 2])
+        .node("y", "ResizeBilinear", &["t", "size"], json!({}));
+    let (json, weights) = graph.files();
+    let at = |size| Network::read_graph_model(&json, &weights, Some(size));
+    let network = at([4, 2]).unwrap();
+    assert_eq!(network.input_shape(), [1, 1, 4, 2]);
+    assert_eq!(network.output_shapes().collect::<Vec<_>>(), [[1, 8, 1, 1]]);
+    let rows: Vec<f32> = (0..8u8).map(f32::from).collect();
+    let halves = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.0].to_vec();
+    assert_eq!(network.run(rows).unwrap(), [halves]);
+    let refused = at([3, 3]).unwrap_err().to_string();
+    assert!(refused.contains("its input cannot have this size"), "{refused}");
 }
 
 #[test]
@@ -147,7 +165,7 @@ fn what_does_not_fit_is_named() {
     ] {
         assert!(message.contains(expected), "{message}: {expected}");
     }
-    let garbage = Network::read_graph_model(b"{\"modelTopology\": {}}", &[]).unwrap_err();
+    let garbage = Network::read_graph_model(b"{\"modelTopology\": {}}", &[], None).unwrap_err();
     assert!(garbage.to_string().contains("not a TensorFlow.js graph model: missing field `node`"));
 }
 
@@ -156,7 +174,7 @@ fn broken_models_are_errors_or_other_networks() {
     for graph in [small(), split()] {
         let (json, weights) = graph.files();
         for n in 0..json.len() {
-            assert!(Network::read_graph_model(&json[..n], &weights).is_err());
+            assert!(Network::read_graph_model(&json[..n], &weights, None).is_err());
         }
         let mut read = 0;
         let files = [json, weights];
@@ -164,7 +182,7 @@ fn broken_models_are_errors_or_other_networks() {
             for value in [b'0', b'9', b'-', 0x7f, 0x80, 0xff, files[k][i] ^ 1] {
                 let mut bad = files.clone();
                 bad[k][i] = value;
-                if let Ok(network) = Network::read_graph_model(&bad[0], &bad[1]) {
+                if let Ok(network) = Network::read_graph_model(&bad[0], &bad[1], None) {
                     let n = network.input_shape().iter().product();
                     if network.work() < 1 << 20 {
                         assert!(network.run(vec![1.0; n]).is_ok());

@@ -6,7 +6,8 @@ use crate::vision::Hint;
 use crate::vision::candidates::clusters::{LETTERS, codebook};
 
 /// The prior log odds that a pixel is on the object: how fast they fall from the centre of
-/// the frame outwards, their bounds, and the power of the curve that bounds the object.
+/// the frame outwards, their bounds, and the power of the curve that bounds the object, two and
+/// a half.
 const FALL: f64 = 6.0;
 const BOUNDS: [f64; 2] = [-4.0, 3.0];
 const POWER: f64 = 2.5;
@@ -64,7 +65,7 @@ impl Known {
         };
         let prior = |at: [f64; 2]| {
             let [u, v] = place(at);
-            let out = libm::pow(libm::pow(u, POWER) + libm::pow(v, POWER), 1.0 / POWER);
+            let out = libm::pow(u * u * u.sqrt() + v * v * v.sqrt(), 1.0 / POWER);
             ((FALL * (1.0 - out)).clamp(BOUNDS[0], BOUNDS[1]) + clicked(at)) as f32
         };
         let out: Vec<f32> =

@@ -29,7 +29,7 @@ const UNITS: f32 = 256.0;
 pub fn cut(window: &Window, known: &Known) -> Option<Area> {
     let width = window.picture.width;
     let mirrored = mirrored(window);
-    let similar = similarities(window);
+    let grid = Grid::new(width, window.picture.height, similarities(window));
     let mut on: Option<Vec<bool>> = None;
     for _ in 0..ESTIMATES {
         let colours = known.colours(&known.belief(on.as_deref()));
@@ -50,7 +50,7 @@ pub fn cut(window: &Window, known: &Known) -> Option<Area> {
                 (UNITS * odds) as i32
             })
             .collect();
-        on = Some(Grid::new(width, &terminal, &similar).object());
+        on = Some(grid.object(&terminal));
     }
     let whole = connected(width, &on?, &known.pointed)?;
     let filled = whole.clone().filled();

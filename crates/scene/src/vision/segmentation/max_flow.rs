@@ -5,14 +5,13 @@
 
 use std::collections::VecDeque;
 
-/// A grid of pixels with weights.
+/// A grid of pixels with the weights of its edges.
+#[derive(Clone)]
 pub struct Grid {
     /// The number of columns, with one more at each side that belongs to no pixel.
     stride: usize,
     width: usize,
     height: usize,
-    /// What it costs to call a pixel background, less what it costs to call it object.
-    terminal: Vec<i32>,
     /// What can still flow to each neighbour.
     left: Vec<[i32; 8]>,
 }
@@ -37,21 +36,13 @@ enum Parent {
 }
 
 impl Grid {
-    /// A grid of pixels in row-major order. `terminal` is what calling a pixel background
-    /// costs more than calling it object; `apart(p, q)` is what it costs to part two
+    /// A grid of pixels in row-major order. `apart(p, q)` is what it costs to part two
     /// neighbours, at least 0.
-    pub fn new(width: usize, terminal: &[i32], apart: impl Fn(usize, usize) -> i32) -> Grid {
-        let (height, stride) = (terminal.len() / width.max(1), width + 2);
-        let mut grid = Grid {
-            stride,
-            width,
-            height,
-            terminal: vec![0; stride * (height + 2)],
-            left: vec![[0; 8]; stride * (height + 2)],
-        };
+    pub fn new(width: usize, height: usize, apart: impl Fn(usize, usize) -> i32) -> Grid {
+        let stride = width + 2;
+        let mut grid = Grid { stride, width, height, left: vec![[0; 8]; stride * (height + 2)] };
         for p in 0..width * height {
             let node = grid.node(p);
-            grid.terminal[node] = terminal[p];
             for (k, [dx, dy]) in NEIGHBOURS.iter().enumerate().skip(4) {
                 let (i, j) = ((p % width) as isize + dx, (p / width) as isize + dy);
                 if i < 0 || i >= width as isize || j >= height as isize {
@@ -76,20 +67,22 @@ impl Grid {
     }
 
     /// Returns the pixels on the object's side of the smallest cut: those that can still be
-    /// reached from the object.
-    pub fn object(self) -> Vec<bool> {
-        let (width, pixels) = (self.width, self.width * self.height);
-        let stride = self.stride;
-        let trees = Search::new(self).finished();
-        (0..pixels)
-            .map(|p| trees[(p / width + 1) * stride + p % width + 1] == Tree::Object)
-            .collect()
+    /// reached from the object. `terminal` is what calling a pixel background costs more than
+    /// calling it object.
+    pub fn object(&self, terminal: &[i32]) -> Vec<bool> {
+        let mut nodes = vec![0; self.left.len()];
+        let pixels = 0..self.width * self.height;
+        pixels.clone().for_each(|p| nodes[self.node(p)] = terminal[p]);
+        let trees = Search::new(self.clone(), nodes).finished();
+        pixels.map(|p| trees[self.node(p)] == Tree::Object).collect()
     }
 }
 
 /// The two trees while they grow.
 struct Search {
     grid: Grid,
+    /// What can still flow from or to a terminal, above 0 from the object.
+    terminal: Vec<i32>,
     tree: Vec<Tree>,
     parent: Vec<Parent>,
     /// When the distance to the terminal was last known, and that distance.
@@ -101,8 +94,8 @@ struct Search {
 }
 
 impl Search {
-    fn new(grid: Grid) -> Search {
-        let n = grid.terminal.len();
+    fn new(grid: Grid, terminal: Vec<i32>) -> Search {
+        let n = terminal.len();
         let mut search = Search {
             tree: vec![Tree::None; n],
             parent: vec![Parent::None; n],
@@ -112,9 +105,10 @@ impl Search {
             waiting: vec![false; n],
             orphans: VecDeque::new(),
             grid,
+            terminal,
         };
         for node in 0..n {
-            let terminal = search.grid.terminal[node];
+            let terminal = search.terminal[node];
             if terminal != 0 {
                 search.tree[node] = if terminal > 0 { Tree::Object } else { Tree::Beside };
                 search.parent[node] = Parent::Terminal;
@@ -205,7 +199,7 @@ impl Search {
                 flow = flow.min(self.room(tree, node, usize::from(towards)));
                 node = self.grid.step(node, usize::from(towards));
             }
-            flow = flow.min(self.grid.terminal[node].abs());
+            flow = flow.min(self.terminal[node].abs());
         }
         self.grid.left[from][k] -= flow;
         self.grid.left[to][7 - k] += flow;
@@ -226,7 +220,7 @@ impl Search {
                 }
                 node = next;
             }
-            let terminal = &mut self.grid.terminal[node];
+            let terminal = &mut self.terminal[node];
             *terminal -= terminal.signum() * flow;
             if *terminal == 0 {
                 self.parent[node] = Parent::None;
@@ -382,7 +376,7 @@ mod tests {
                     let weights: Vec<i32> =
                         (0..n * n).map(|_| (strength * next()) as i32).collect();
                     let apart = |p: usize, q: usize| weights[p * n + q];
-                    let object = Grid::new(width, &terminal, apart).object();
+                    let object = Grid::new(width, height, apart).object(&terminal);
                     let found = cost(width, &terminal, apart, &object);
                     assert_eq!(found, least_cost(width, &terminal, apart), "{width} x {height}");
                 }

@@ -20,6 +20,7 @@ use crate::vision::candidates::pixels::Pixels;
 use crate::vision::{Hint, Mask, Photo};
 use colours::Known;
 use frame::Frame;
+use pcadlang_numerics::platform::threads::map_side_by_side;
 use window::Window;
 
 /// Pixels along the longer side of an object, for guesses and for masks.
@@ -63,22 +64,21 @@ pub struct Guess {
 }
 
 /// Returns guesses of the outline of the object that a hint points out by a box or an axis:
-/// by some methods, in the order of [`Method`] and the likelier ones first. None if neither is
+/// by some methods, in their order and the likelier ones first. None if neither is
 /// given, or if they are not in the photograph.
 pub fn guesses(photo: &Photo, hint: &Hint, methods: &[Method]) -> Vec<Guess> {
     let Some(frame) = Frame::of(hint, photo.width(), photo.height()) else { return Vec::new() };
     let window = Window::new(photo, &frame, LONGER);
     let known = Known::new(&window, hint);
-    let mut found = Vec::new();
-    if methods.contains(&Method::Ellipse) {
-        found.extend(ellipses(&window));
-    }
-    if methods.contains(&Method::Cut) {
-        found.extend(graph_cut::cut(&window, &known).map(|area| cut_guess(&window, area)));
-    }
-    if methods.contains(&Method::Symmetric) {
-        found.extend(symmetric_guesses(&window, &known));
-    }
+    let found = map_side_by_side(methods, |method| match method {
+        Method::Ellipse => ellipses(&window),
+        Method::Cut => {
+            let area = graph_cut::cut(&window, &known);
+            area.map(|area| cut_guess(&window, area)).into_iter().collect()
+        }
+        Method::Symmetric => symmetric_guesses(&window, &known),
+    });
+    let found: Vec<Found> = found.into_iter().flatten().collect();
     let first = |method: Method| found.iter().find(|f| f.method == method).map(|f| &f.area);
     let score = |found: &Found| {
         let others: Vec<f64> = Method::ALL

@@ -30,15 +30,12 @@ pub struct Prices {
 pub struct Strip {
     pub rows: usize,
     pub columns: usize,
-    /// Sums of what the cells of a row before each column gain inside an outline: one entry
-    /// more per row than there are columns.
-    pub inside: Vec<f32>,
-    /// The same of what they gain on a flat end.
+    /// Sums of what the cells of a row before each column gain on a flat end: one entry more per
+    /// row than there are columns.
     pub ends: Vec<f32>,
-    /// What a right side of each slope gains per row, by slope, row and column.
-    pub right: Vec<f32>,
-    /// What a left side gains, by slope and row, with the columns from right to left.
-    pub left: Vec<f32>,
+    /// What a side gains per row, by its slope to the right, row and column. That of a left side
+    /// is the reverse of the outline's.
+    pub sides: Vec<f32>,
 }
 
 /// An outline: half-widths from a first row on.
@@ -58,6 +55,9 @@ pub struct Table {
     best: Vec<f32>,
     /// What the last row allows to go on with, by slope and half-width.
     before: Vec<f32>,
+    /// What a row gains by half-width: as a flat end, inside, and as the end after it; and the
+    /// best score in it.
+    spans: [Vec<f32>; 4],
 }
 
 /// States per half-width: the slopes, and the beginning.
@@ -65,9 +65,11 @@ const STATES: usize = SLOPES + 1;
 
 impl Strip {
     /// Returns the best outline about the axis in a column, with half-widths of at most
-    /// `widest` cells; `None` if the strip has no room for any.
+    /// `widest` cells; `None` if the strip has no room for any. `inside` is what cells gain inside
+    /// it, in sums like those of ends.
     pub fn outline(
         &self,
+        inside: &[f32],
         axis: usize,
         widest: usize,
         prices: &Prices,
@@ -83,57 +85,52 @@ impl Strip {
         table.best.resize(self.rows * STATES * stride, NEVER);
         table.before.clear();
         table.before.resize(SLOPES * stride, NEVER);
+        table.spans.iter_mut().for_each(|s| s.resize(stride, NEVER));
         let (mut best, mut end) = (NEVER, (0, 0, 0));
         for t in 1..self.rows - 1 {
-            let (done, rest) = table.best.split_at_mut(t * STATES * stride);
+            let Table { best: scores, before, spans: [begin, within, after, most] } = &mut *table;
+            let (done, rest) = scores.split_at_mut(t * STATES * stride);
             let row = &mut rest[..STATES * stride];
             vectorised(
                 #[inline(always)]
                 || {
                     if t > 1 {
-                        ways_on(
-                            &done[(t - 1) * STATES * stride..],
-                            stride,
-                            prices,
-                            &mut table.before,
-                        );
-                        self.continued(axis, t, stride, prices.slope, &table.before, row);
+                        ways_on(&done[(t - 1) * STATES * stride..], stride, prices, before);
+                        self.continued(axis, t, stride, prices.slope, before, row);
                     }
-                    self.begun(axis, t, stride, row);
+                    self.spans(&self.ends, axis, t, begin);
+                    self.spans(inside, axis, t, within);
+                    self.spans(&self.ends, axis, t + 1, after);
+                    row[SLOPES * stride..].copy_from_slice(begin);
+                    most.fill(NEVER);
+                    for scores in row.chunks_exact_mut(stride) {
+                        let gained = scores.iter_mut().zip(&*within).zip(&mut *most);
+                        for ((score, within), most) in gained {
+                            *score += within;
+                            *most = most.max(*score);
+                        }
+                    }
+                    most.iter_mut().zip(&*after).for_each(|(most, after)| *most += after);
                 },
             );
-            for (state, scores) in row.chunks_exact(stride).enumerate() {
-                for w in LEAST..stride {
-                    let score = scores[w] + self.end(axis, t + 1, w);
-                    if score > best {
-                        (best, end) = (score, (t, state, w));
-                    }
-                }
+            let highest = most[LEAST..].iter().fold(NEVER, |a, b| a.max(*b));
+            if highest > best {
+                let is_highest = |i: &usize| row[*i] + after[i % stride] == highest;
+                let found = (0..row.len()).filter(|i| i % stride >= LEAST).find(is_highest);
+                (best, end) = (highest, found.map_or(end, |i| (t, i / stride, i % stride)));
             }
         }
         let (first, widths) = self.traced(end, stride, prices, &table.best);
         Some(Outline { score: best, first, widths })
     }
 
-    /// What a flat end just before or after an outline gains in a row.
+    /// Fills in for each half-width what a row gains, by its sums before each column.
     #[inline(always)]
-    fn end(&self, axis: usize, row: usize, w: usize) -> f32 {
-        let ends = &self.ends[row * (self.columns + 1)..];
-        ends[axis + w + 1] - ends[axis - w]
-    }
-
-    /// Fills in the scores of outlines that begin in a row, and adds to all what is inside
-    /// it.
-    #[inline(always)]
-    fn begun(&self, axis: usize, t: usize, stride: usize, row: &mut [f32]) {
-        for w in LEAST..stride {
-            row[SLOPES * stride + w] = self.end(axis, t, w);
-        }
-        let inside = &self.inside[t * (self.columns + 1)..];
-        for scores in row.chunks_exact_mut(stride) {
-            for w in LEAST..stride {
-                scores[w] += inside[axis + w + 1] - inside[axis - w];
-            }
+    fn spans(&self, sums: &[f32], axis: usize, row: usize, out: &mut [f32]) {
+        let sums = &sums[row * (self.columns + 1)..];
+        let (left, right) = (&sums[axis + 1 - out.len()..][..out.len()], &sums[axis + 1..]);
+        for ((out, left), right) in out.iter_mut().zip(left.iter().rev()).zip(right) {
+            *out = right - left;
         }
     }
 
@@ -156,14 +153,14 @@ impl Strip {
             let last = (stride as isize + slope.min(0)).max(first as isize) as usize;
             let from = (first as isize - slope) as usize;
             let middle = (2 * first as isize - slope).div_euclid(2) as usize;
-            let at = (m * self.rows + t) * self.columns;
             let count = last - first;
-            let right = &self.right[at + axis + middle..][..count];
-            let left = &self.left[at + self.columns - 1 - axis + middle..][..count];
+            let side = |m: usize| &self.sides[(m * self.rows + t) * self.columns..];
+            let right = &side(m)[axis + middle..][..count];
+            let left = &side(SLOPES - 1 - m)[axis + 1 - middle - count..][..count];
             let before = &before[m * stride + from..][..count];
             let scores = &mut row[m * stride + first..][..count];
             for i in 0..count {
-                scores[i] = before[i] + right[i] + left[i] - price;
+                scores[i] = before[i] + right[i] + left[count - 1 - i] - price;
             }
         }
     }
@@ -248,30 +245,21 @@ mod tests {
     const AXIS: usize = 13;
     const PRICES: Prices = Prices { slope: 0.1, change: 0.3, most: 1.5 };
 
-    /// A strip of random gains, as sums and by cell.
-    fn strip(seed: u64) -> (Strip, Vec<f32>, Vec<f32>) {
+    /// A strip of random gains and what is inside, as sums, and both by cell.
+    fn strip(seed: u64) -> (Strip, Vec<f32>, [Vec<f32>; 2]) {
         let mut next = numbers(seed);
         let mut list =
             |n: usize, scale: f32| -> Vec<f32> { (0..n).map(|_| scale * (next() - 0.5)).collect() };
         let (inside, ends) = (list(ROWS * COLUMNS, 0.5), list(ROWS * COLUMNS, 1.0));
-        let right = list(SLOPES * ROWS * COLUMNS, 6.0);
-        let left = list(SLOPES * ROWS * COLUMNS, 6.0);
+        let sides = list(SLOPES * ROWS * COLUMNS, 6.0);
         let sums = |cells: &[f32]| -> Vec<f32> {
             let row = |row: &[f32]| -> Vec<f32> {
                 (0..=COLUMNS).map(|n| row[..n].iter().sum()).collect()
             };
             cells.chunks(COLUMNS).flat_map(row).collect()
         };
-        let (inside_sums, ends_sums) = (sums(&inside), sums(&ends));
-        let strip = Strip {
-            rows: ROWS,
-            columns: COLUMNS,
-            inside: inside_sums,
-            ends: ends_sums,
-            right,
-            left,
-        };
-        (strip, inside, ends)
+        let strip = Strip { rows: ROWS, columns: COLUMNS, ends: sums(&ends), sides };
+        (strip, sums(&inside), [inside, ends])
     }
 
     /// What an outline gains, cell by cell.
@@ -292,9 +280,11 @@ mod tests {
                 return f32::NEG_INFINITY;
             }
             let middle = (w + widths[i - 1]) / 2;
-            let at = ((slope + STEEPEST as isize) as usize * ROWS + first + i) * COLUMNS;
-            sum += strip.right[at + AXIS + middle];
-            sum += strip.left[at + COLUMNS - 1 - (AXIS - middle)];
+            let side = |slope: isize, column: usize| {
+                let m = (slope + STEEPEST as isize) as usize;
+                strip.sides[(m * ROWS + first + i) * COLUMNS + column]
+            };
+            sum += side(slope, AXIS + middle) + side(-slope, AXIS - middle);
             sum -= PRICES.slope * slope.unsigned_abs() as f32;
             if let Some(before) = before {
                 sum -= (PRICES.change * slope.abs_diff(before) as f32).min(PRICES.most);
@@ -309,8 +299,8 @@ mod tests {
         const WIDEST: usize = 10;
         let mut table = Table::default();
         for seed in 0..30 {
-            let (strip, inside, ends) = strip(seed);
-            let found = strip.outline(AXIS, WIDEST, &PRICES, &mut table).unwrap();
+            let (strip, sums, [inside, ends]) = strip(seed);
+            let found = strip.outline(&sums, AXIS, WIDEST, &PRICES, &mut table).unwrap();
             let own = gain(&strip, &inside, &ends, found.first, &found.widths);
             assert!((found.score - own).abs() < 1e-3, "{} is {own}", found.score);
             let mut best = f32::NEG_INFINITY;
@@ -331,10 +321,11 @@ mod tests {
 
     #[test]
     fn without_room_there_is_no_outline() {
-        let (strip, _, _) = strip(1);
+        let (strip, sums, _) = strip(1);
         let mut table = Table::default();
         for (axis, widest) in [(0, 10), (3, 10), (COLUMNS - 4, 10), (COLUMNS, 10), (AXIS, 1)] {
-            assert_eq!(strip.outline(axis, widest, &PRICES, &mut table), None, "{axis} {widest}");
+            let found = strip.outline(&sums, axis, widest, &PRICES, &mut table);
+            assert_eq!(found, None, "{axis} {widest}");
         }
     }
 }

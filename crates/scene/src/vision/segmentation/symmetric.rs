@@ -9,6 +9,7 @@ use crate::vision::candidates::pixels::Pixels;
 use crate::vision::detect::gradient::smoothed;
 use crate::vision::hint::polygon;
 use pcadlang_numerics::num::simd::vectorised;
+use pcadlang_numerics::platform::threads::map_side_by_side;
 
 /// Cells along the longer side of the frame.
 const CELLS: f64 = 72.0;
@@ -73,36 +74,34 @@ pub fn outlines(window: &Window, known: &Known) -> Vec<Symmetric> {
         let shorter = 2.0 * frame.half[0].min(frame.half[1]);
         (&ANGLES, OFFSETS.iter().map(|o| o * shorter / cell).collect())
     };
-    let mut turned: Vec<Turned> = angles
-        .iter()
-        .map(|angle| {
-            let turned = Frame { lean: frame.lean + angle, ..frame };
-            Turned { frame: turned, strip: edges(window, &local, &turned, cell, rows) }
-        })
-        .collect();
+    let turned = map_side_by_side(angles, |angle| {
+        let turned = Frame { lean: frame.lean + angle, ..frame };
+        Turned { frame: turned, strip: edges(window, &local, &turned, cell, rows) }
+    });
     let mut axes: Vec<(usize, f64)> =
         (0..turned.len()).flat_map(|a| offsets.iter().map(move |o| (a, *o))).collect();
     let widest = (0.62 * libm::hypot(2.0 * frame.half[0], 2.0 * frame.half[1]) / cell) as usize;
-    let mut table = Table::default();
     let mut on: Option<Vec<bool>> = None;
     let mut found: Vec<Symmetric> = Vec::new();
     for _ in 0..ESTIMATES {
         let gains = gains(known, &known.colours(&known.belief(on.as_deref())));
-        for (a, t) in turned.iter_mut().enumerate() {
-            if axes.iter().any(|(b, _)| *b == a) {
-                fill_inside(window, &gains, t, cell);
-            }
-        }
-        let mut scored: Vec<(Symmetric, (usize, f64))> = axes
-            .iter()
-            .filter_map(|(a, offset)| {
-                let Turned { frame: turned, strip } = &turned[*a];
+        let mut used: Vec<usize> = axes.iter().map(|(a, _)| *a).collect();
+        used.sort_unstable();
+        used.dedup();
+        let scored = map_side_by_side(&used, |a| {
+            let Turned { frame: turned, strip } = &turned[*a];
+            let (inside, mut table) =
+                (inside(window, &gains, turned, cell, rows), Table::default());
+            let about = |offset: f64| {
                 let column = (0.5 * rows as f64 + offset).round() as usize;
-                let outline = strip.outline(column, widest, &PRICES, &mut table)?;
+                let outline = strip.outline(&inside, column, widest, &PRICES, &mut table)?;
                 let found = Symmetric::new(&outline, column, turned, &frame, cell, rows);
-                Some((found, (*a, *offset)))
-            })
-            .collect();
+                Some((found, (*a, offset)))
+            };
+            let own = axes.iter().filter(|(b, _)| b == a).map(|(_, offset)| *offset);
+            own.filter_map(about).collect::<Vec<_>>()
+        });
+        let mut scored: Vec<(Symmetric, (usize, f64))> = scored.into_iter().flatten().collect();
         scored.sort_by(|a, b| b.0.score.total_cmp(&a.0.score));
         scored.truncate(KEPT);
         axes = scored.iter().map(|(_, axis)| *axis).collect();
@@ -234,32 +233,28 @@ fn edges(window: &Window, local: &[f32], frame: &Frame, cell: f64, rows: usize) 
         both[p] = c * s * (yy - xx) + (c * c - s * s) * xy;
         mean[p] = m;
     }
-    let mut right = vec![0.0f32; SLOPES * n];
-    let mut left = vec![0.0f32; SLOPES * n];
-    let mut edge = vec![0.0f32; n];
+    let mut sides = vec![0.0f32; SLOPES * n];
+    // Its first and last ones twice.
+    let mut edge = vec![0.0f32; n + 2];
     for m in 0..SLOPES {
         let slope = m as f32 - STEEPEST as f32;
         let length = (1.0 + slope * slope).sqrt();
         vectorised(
             #[inline(always)]
             || {
-                for p in 0..n {
-                    let square = across[p] - 2.0 * slope * both[p] + slope * slope * along[p];
-                    edge[p] = square.max(0.0).sqrt() / length;
+                let tensor = across.iter().zip(&both).zip(&along);
+                for (edge, ((across, both), along)) in edge[1..=n].iter_mut().zip(tensor) {
+                    let square = across - 2.0 * slope * both + slope * slope * along;
+                    *edge = square.max(0.0).sqrt() / length;
                 }
-                let gain = &mut right[m * n..(m + 1) * n];
-                for p in 0..n {
-                    let e = edge[p].max(edge[p.saturating_sub(1)]).max(edge[(p + 1).min(n - 1)]);
-                    gain[p] = edge_gain(e, mean[p]) * length;
+                (edge[0], edge[n + 1]) = (edge[1], edge[n]);
+                let near = edge[..n].iter().zip(&edge[1..=n]).zip(&edge[2..]);
+                let gains = sides[m * n..(m + 1) * n].iter_mut();
+                for ((gain, mean), ((a, b), c)) in gains.zip(&mean).zip(near) {
+                    *gain = edge_gain(b.max(*a).max(*c), *mean) * length;
                 }
             },
         );
-    }
-    for m in 0..SLOPES {
-        let (from, to) = (&right[(SLOPES - 1 - m) * n..], &mut left[m * n..(m + 1) * n]);
-        for (to, from) in to.chunks_exact_mut(rows).zip(from.chunks_exact(rows)) {
-            to.iter_mut().zip(from.iter().rev()).for_each(|(t, f)| *t = *f);
-        }
     }
     let mut ends = vec![0.0f32; rows * (rows + 1)];
     for t in 0..rows {
@@ -272,19 +267,20 @@ fn edges(window: &Window, local: &[f32], frame: &Frame, cell: f64, rows: usize) 
             ends[t * (rows + 1) + d + 1] = sum;
         }
     }
-    Strip { rows, columns: rows, inside: vec![0.0; rows * (rows + 1)], ends, right, left }
+    Strip { rows, columns: rows, ends, sides }
 }
 
-/// Fills in what the cells of a strip gain inside an outline.
-fn fill_inside(window: &Window, gains: &[f32], turned: &mut Turned, cell: f64) {
-    let rows = turned.strip.rows;
+/// Returns sums of what the cells of a strip gain inside an outline.
+fn inside(window: &Window, gains: &[f32], turned: &Frame, cell: f64, rows: usize) -> Vec<f32> {
+    let mut sums = vec![0.0; rows * (rows + 1)];
     let mut sum = 0.0;
-    for (p, at) in cells(&turned.frame, cell, rows).enumerate() {
+    for (p, at) in cells(turned, cell, rows).enumerate() {
         let (t, d) = (p / rows, p % rows);
         if d == 0 {
             sum = 0.0;
         }
         sum += between(window, at, [BEYOND], |p| [gains[p]])[0];
-        turned.strip.inside[t * (rows + 1) + d + 1] = sum;
+        sums[t * (rows + 1) + d + 1] = sum;
     }
+    sums
 }

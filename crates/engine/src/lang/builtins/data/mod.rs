@@ -11,7 +11,7 @@ mod json;
 mod kinds;
 
 pub use format::{DataFormat, Literal, Options, ReadRelative};
-pub use json::from_json;
+pub use json::Json;
 
 use super::{Arg, Args, Row, Type, arg, function};
 use crate::lang::error::{Fault, FaultKind};
