@@ -11,7 +11,7 @@ use crate::trace::graph::Graph;
 use crate::trace::node::*;
 use crate::trace::store::Store;
 use pcadlang_numerics::num::ExactSum;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::SmallVec;
 use std::sync::Arc;
 
@@ -112,9 +112,19 @@ impl InPlace {
         fits
     }
 
-    /// Adds the score of a node.
-    pub fn add_score(&mut self, n: NodeId, given: Given, scored: Scored) {
+    /// Adds the score of a node; false if the node keeps another kind of score.
+    pub fn add_score(&mut self, graph: &Store, n: NodeId, given: Given, scored: Scored) -> bool {
+        let is_one = matches!(scored, Scored::Numbers(_, false)) && given.len() <= 1;
+        let fits = !is_one || takes_one(graph.op(n), graph[n].side.as_deref());
         self.scores.push((given, n, scored));
+        fits
+    }
+
+    /// The nodes to which the tape gives anything else than one number.
+    pub fn others(&self) -> FxHashSet<NodeId> {
+        let values = self.values.iter().map(|(_, n, _)| *n);
+        let besides = self.besides.iter().map(|(_, n, _)| *n);
+        values.chain(besides).chain(self.scores.iter().map(|(_, n, _)| *n)).collect()
     }
 
     /// Everything where the complete tape has it.
@@ -153,27 +163,20 @@ impl InPlace {
                 self.made.push(value);
             }
         }
-        let one = |s: &OneNumber| {
-            let node = &graph.store[s.node];
-            !s.applies(values)
-                || node.state != State::Clean
-                || takes_one(graph.op(s.node), node.side.as_deref())
-        };
-        self.number_scores.iter().all(one)
-            && self.scores.iter().filter(|(given, n, _)| holds(graph, given, *n, values)).all(
-                |(_, n, scored)| {
-                    let terms = tape.terms(scored, &mut self.each, &mut self.columns);
-                    let node = &graph.store[*n];
-                    match (graph.op(*n), node.side.as_deref(), terms) {
-                        (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
-                            c.scores.len() == self.each.len() && c.elements != NONE
-                        }
-                        (Op::Observe { .. }, Some(Side::Total(_)), Some(_)) => true,
-                        (op, side, Some(ScoreTerms::One(_))) => takes_one(op, side),
-                        _ => false,
+        self.scores.iter().filter(|(given, n, _)| holds(graph, given, *n, values)).all(
+            |(_, n, scored)| {
+                let terms = tape.terms(scored, &mut self.each, &mut self.columns);
+                let node = &graph.store[*n];
+                match (graph.op(*n), node.side.as_deref(), terms) {
+                    (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
+                        c.scores.len() == self.each.len() && c.elements != NONE
                     }
-                },
-            )
+                    (Op::Observe { .. }, Some(Side::Total(_)), Some(_)) => true,
+                    (op, side, Some(ScoreTerms::One(_))) => takes_one(op, side),
+                    _ => false,
+                }
+            },
+        )
     }
 
     /// Moves the trace to the point of the tape's last run, after [`InPlace::fits`]. The
