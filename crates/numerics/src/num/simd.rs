@@ -1,7 +1,7 @@
 //! Loops over many numbers, vectorised with the widest instructions of the processor.
 //!
-//! The same code is compiled twice, for the baseline and for AVX2, and selected at run
-//! time. Nothing is fused or reordered, so both give the same bits.
+//! The same code is compiled for the baseline, for AVX2 and for AVX-512, and selected at run
+//! time. Nothing is fused or reordered, so all give the same bits.
 
 /// Runs `work`, compiled for the processor's widest instructions where it is inlined.
 #[inline]

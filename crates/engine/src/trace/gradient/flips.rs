@@ -222,7 +222,8 @@ impl Flips {
         let count = |graph: &mut Graph, undo: bool| {
             for r in references() {
                 let refs = &mut graph.store[r.to].refs;
-                *refs = if r.acquired == undo { refs.wrapping_sub(1) } else { refs.wrapping_add(1) };
+                *refs =
+                    if r.acquired == undo { refs.wrapping_sub(1) } else { refs.wrapping_add(1) };
             }
         };
         count(graph, false);

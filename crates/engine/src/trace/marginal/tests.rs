@@ -215,7 +215,8 @@ fn ended_in_place(text: &str, power: f64) -> (usize, Option<usize>) {
         ended += usize::from(there);
     }
     // Updates from there reach what they do after proposals.
-    let (sites, moving) = (tape.summed().to_vec(), here.iter().map(|y| y + 0.3).collect::<Vec<_>>());
+    let (sites, moving) =
+        (tape.summed().to_vec(), here.iter().map(|y| y + 0.3).collect::<Vec<_>>());
     let mut all = Vec::new();
     tape.changes(&moving, &mut all);
     for t in sites {
