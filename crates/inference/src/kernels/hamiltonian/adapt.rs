@@ -1,8 +1,9 @@
 //! Warm-up of Hamiltonian kernels: dual averaging of the step size (Hoffman & Gelman
 //! 2014, section 3.2), and a metric from windows that double in length, as in Stan: scales
 //! from variances, and a map that makes up for correlations (`super::curvature`). Other than
-//! in Stan, variances are not shrunk towards 1e-3, which is not small where a scale is
-//! smaller. docs/measurements/speed.md says what others cost.
+//! in Stan, dual averaging goes on from window to window unless the metric changes much, and
+//! variances are not shrunk towards 1e-3, which is not small where a scale is smaller.
+//! docs/measurements/speed.md says what others cost.
 
 use super::curvature::Window;
 use super::metric::{Metric, Mixing};
@@ -340,5 +341,27 @@ mod tests {
         assert_eq!(adaptation.step, 0.0);
         let length = adaptation.averaged * adaptation.metric.scales[0];
         assert!((length / 1e-30 - 1.0).abs() < 1e-6, "{length}");
+    }
+
+    #[test]
+    fn dual_averaging_goes_on_unless_the_metric_changes_much() {
+        for (scale, goes_on) in [(2.0, true), (0.5, false)] {
+            let mut adaptation = Adaptation::new(0.8, None);
+            adaptation.signature = vec![(7, 1)];
+            adaptation.metric = Metric::new(vec![scale], &Mixing::default());
+            adaptation.mean_log = libm::log(3.0);
+            // The window finds a scale of 1.4.
+            for i in 0..BURN + WINDOW {
+                adaptation.learn(0.8, &[f64::from(i % 5)], &[0.0]);
+            }
+            assert_eq!(adaptation.rounds > 0.0, goes_on);
+            let length = adaptation.averaged * adaptation.metric.scales[0];
+            assert!((length / (3.0 * scale) - 1.0).abs() < 1e-9, "{length}");
+            adaptation.learn(0.8, &[0.0], &[0.0]);
+            if goes_on {
+                let next = adaptation.step * adaptation.metric.scales[0];
+                assert!((next / (3.0 * scale) - 1.0).abs() < 1e-9, "{next}");
+            }
+        }
     }
 }
