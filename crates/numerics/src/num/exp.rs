@@ -3,7 +3,7 @@
 //! The same arithmetic as that of `libm::exp` (FreeBSD's `e_exp.c`), with its branches as
 //! selections, so that a loop over it is vectorised and the results are the same bits.
 
-use super::simd::vectorised;
+use super::simd::vectorised_if_many;
 
 /// The leading bits of ln 2, so that products with small integers are exact, and the rest.
 const LN2_HIGH: f64 = f64::from_bits(0x3fe6_2e42_fee0_0000);
@@ -47,7 +47,8 @@ pub(super) fn normal(x: f64) -> f64 {
 
 /// Replaces each number by its exponential, with the bits of `libm::exp`.
 pub fn exp_each(xs: &mut [f64]) {
-    vectorised(
+    vectorised_if_many(
+        xs.len(),
         #[inline(always)]
         || {
             for part in xs.chunks_mut(64) {

@@ -1,22 +1,29 @@
 //! Loops over many numbers, vectorised with the widest instructions of the processor.
 //!
-//! The same code is compiled twice, for the baseline and for AVX2, and selected at run
-//! time. Nothing is fused or reordered, so both give the same bits.
+//! The same code is compiled for the baseline, for AVX2 and for AVX-512, and selected at run
+//! time. Nothing is fused or reordered, so all give the same bits.
 
-/// Runs `work`, compiled for the processor's widest instructions where it is inlined.
+/// Runs `work`, compiled for instructions of the processor as wide as AVX2 where it is inlined:
+/// with AVX-512, loops over pixels, which gather and scatter, take longer.
 #[inline]
 pub fn vectorised<R>(work: impl FnOnce() -> R) -> R {
     if PORTABLE.get() {
         return work();
     }
+    #[cfg(target_arch = "x86_64")]
+    return match pulp::x86::V3::try_new() {
+        Some(avx2) => pulp::Simd::vectorize(avx2, work),
+        None => work(),
+    };
+    #[cfg(not(target_arch = "x86_64"))]
     pulp::Arch::new().dispatch(work)
 }
 
-/// Runs `work` on `n` numbers, as [`vectorised`] does if they are many: for few, choosing costs
-/// more than it saves.
+/// Runs `work` on `n` numbers, compiled for the widest instructions where it is inlined, if they
+/// are many: for few, choosing costs more than it saves.
 #[inline(always)]
 pub fn vectorised_if_many<R>(n: usize, work: impl FnOnce() -> R) -> R {
-    if n < MANY { work() } else { vectorised(work) }
+    if n < MANY || PORTABLE.get() { work() } else { pulp::Arch::new().dispatch(work) }
 }
 
 const MANY: usize = 32;

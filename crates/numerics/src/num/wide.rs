@@ -6,7 +6,7 @@
 //! are the same on every platform. Both are accurate to about 1e-15.
 
 use super::exp::normal;
-use super::simd::vectorised;
+use super::simd::vectorised_if_many;
 
 /// ln 2 in two parts, the first with few enough bits that its multiples are exact.
 const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;
@@ -62,7 +62,8 @@ pub fn log_sum_exp_rows(rows: &mut [f64], out: &mut [f64]) -> bool {
     if rows.len() == 2 * n {
         return log_sum_exp_of_two(rows, out);
     }
-    vectorised(
+    vectorised_if_many(
+        n,
         #[inline(always)]
         || {
             let mut sums = [0.0; STRIP];
@@ -107,7 +108,8 @@ fn log_sum_exp_of_two(rows: &mut [f64], out: &mut [f64]) -> bool {
     let n = out.len();
     let (first, second) = rows.split_at_mut(n);
     let second = &mut second[..n];
-    vectorised(
+    vectorised_if_many(
+        n,
         #[inline(always)]
         || {
             let mut defined = true;

@@ -30,7 +30,10 @@ impl Term {
             let x = v[at];
             row.iter_mut().for_each(|r| *r += x);
         } else {
-            row.iter_mut().zip(&v[at..]).for_each(|(r, x)| *r += x);
+            // Not by `for_each`, which is not compiled for wide instructions if not inlined.
+            for (r, x) in row.iter_mut().zip(&v[at..]) {
+                *r += x;
+            }
         }
     }
 }
@@ -60,7 +63,9 @@ impl LogSumExp {
                 let rows = self.shares.chunks_exact_mut(n.max(1));
                 for (terms, row) in self.values.iter().zip(rows) {
                     row.fill(0.0);
-                    terms.iter().for_each(|t| t.add(before, power, row));
+                    for t in terms {
+                        t.add(before, power, row);
+                    }
                 }
             },
         );
@@ -88,8 +93,9 @@ impl LogSumExp {
                 if t.column.step == 0 {
                     before[at] += sum_of_triples(row, by, by, |s, b, _| scale * (s * b));
                 } else {
-                    let parts = row.iter().zip(by).map(|(s, b)| scale * (s * b));
-                    before[at..].iter_mut().zip(parts).for_each(|(g, p)| *g += p);
+                    for ((g, s), b) in before[at..].iter_mut().zip(row).zip(by) {
+                        *g += scale * (s * b);
+                    }
                 }
             }
         }
@@ -97,6 +103,6 @@ impl LogSumExp {
 
     /// Returns the conditional probabilities of the values of choice `i`.
     pub fn conditional(&self, i: usize) -> impl Iterator<Item = f64> {
-        self.shares.iter().skip(i).step_by(self.n.max(1)).copied()
+        (0..self.values.len()).map(move |value| self.shares[value * self.n + i])
     }
 }
