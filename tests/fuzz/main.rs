@@ -451,7 +451,7 @@ fn accepts_its_seeds(name: &str, target: Target) {
             "network" => pcadlang_detectors::nn::Network::read(seed).is_ok(),
             "graph_model" => {
                 let (json, weights) = seed.split_at(seed.iter().position(|b| *b == 0).unwrap());
-                pcadlang_detectors::nn::Network::read_graph_model(json, &weights[1..]).is_ok()
+                pcadlang_detectors::nn::Network::read_graph_model(json, &weights[1..], None).is_ok()
             }
             "checkpoint" => pcadlang_inference::Checkpoint::from_bytes(seed).is_ok(),
             _ => true,
