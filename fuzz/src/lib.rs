@@ -439,7 +439,9 @@ fn runs(read: Result<Network, NetworkError>) {
 pub fn graph_model(bytes: &[u8]) {
     let at = bytes.iter().position(|b| *b == 0).unwrap_or(bytes.len());
     let weights = bytes.get(at + 1..).unwrap_or_default();
-    runs(Network::read_graph_model(&bytes[..at], weights, None));
+    for image in [None, Some([64, 32])] {
+        runs(Network::read_graph_model(&bytes[..at], weights, image));
+    }
 }
 
 /// Tests a text frame of the studio: it is read or answered, and the answer is JSON.

@@ -212,6 +212,9 @@ pub fn options(job: &Job, ready: &Ready, callback: Option<Arc<dyn Callback>>) ->
     }
 }
 
+/// A run's results, fields of its `run.json`, and pictures for its page.
+type Summarised = (Outcome, Map<String, Value>, Vec<PagePicture>);
+
 /// A run and where it is written.
 struct Fill<'a> {
     job: &'a Job,
@@ -316,14 +319,13 @@ impl Fill<'_> {
         })
     }
 
-    /// Summarises the draws, and writes pictures of the best state and of each mode. Returns
-    /// fields of `run.json` and pictures for the page too.
+    /// Summarises the draws, and writes pictures of the best state and of each mode.
     fn summarise(
         &self,
         ran: Started,
         draws: &[ChainDraws],
         interrupted: bool,
-    ) -> Result<(Outcome, Map<String, Value>, Vec<PagePicture>), Failure> {
+    ) -> Result<Summarised, Failure> {
         let Fill { job, ready, dir, watched, .. } = self;
         let Started { chains, mut warnings, .. } = ran;
         let (seed, image) = (job.sampling.seed, &ready.named_image);
