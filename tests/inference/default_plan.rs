@@ -233,7 +233,7 @@ fn choices_without_a_derivative_are_moved_by_slice() {
     let mean = sum(&|x| x * weight(x)) / sum(&weight);
     let d = run(text, 2, 4);
     assert_mean("x", &d["x"], mean, 0.1);
-    assert_mean("m", &d["m"], 0.5, 0.12);
+    assert_mean("m", &d["m"], 0.5, 0.1);
 }
 
 /// Single-site moves cannot leave a mode of choices that depend on each other, and are said to

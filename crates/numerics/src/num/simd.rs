@@ -23,7 +23,13 @@ pub fn vectorised<R>(work: impl FnOnce() -> R) -> R {
 /// are many: for few, choosing costs more than it saves.
 #[inline(always)]
 pub fn vectorised_if_many<R>(n: usize, work: impl FnOnce() -> R) -> R {
-    if n < MANY || PORTABLE.get() { work() } else { pulp::Arch::new().dispatch(work) }
+    if n < MANY { work() } else { widest(work) }
+}
+
+// Apart, so that the loop over few numbers is inlined as if there were no other.
+#[inline(never)]
+fn widest<R>(work: impl FnOnce() -> R) -> R {
+    if PORTABLE.get() { work() } else { pulp::Arch::new().dispatch(work) }
 }
 
 const MANY: usize = 32;

@@ -1,9 +1,8 @@
 //! Warm-up of Hamiltonian kernels: dual averaging of the step size (Hoffman & Gelman
 //! 2014, section 3.2), and a metric from windows that double in length, as in Stan: scales
 //! from variances, and a map that makes up for correlations (`super::curvature`). Other than
-//! in Stan, dual averaging goes on from window to window unless the metric changes much, and
-//! variances are not shrunk towards 1e-3, which is not small where a scale is smaller.
-//! docs/measurements/speed.md says what others cost.
+//! in Stan, variances are not shrunk towards 1e-3, which is not small where a scale is
+//! smaller. docs/measurements/speed.md says what others cost.
 
 use super::curvature::Window;
 use super::metric::{Metric, Mixing};
@@ -37,11 +36,6 @@ const LIGHTEST: f64 = 1e140;
 /// the first window.
 const BURN: u32 = 30;
 const WINDOW: u32 = 25;
-
-/// The factor up to which a window may change scales without beginning dual averaging again.
-/// Each beginning makes steps too short: they vary by half at first, and acceptance falls
-/// faster with longer steps than it rises with shorter ones.
-const SETTLED: f64 = 2.0;
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Adaptation {
@@ -207,29 +201,21 @@ impl Adaptation {
             self.together.add(y, force);
         }
         if self.seen == self.window_end {
+            let log_longer = self.close();
             self.window = self.window.saturating_mul(2);
             self.window_end = self.seen.saturating_add(self.window);
-            let (log_longer, settled) = self.close();
-            let longer = |step: f64| {
-                let log_step = libm::log(step.max(f64::MIN_POSITIVE)) + log_longer;
-                libm::exp(log_step.clamp(SHORTEST, LONGEST))
-            };
-            self.averaged = longer(self.averaged);
-            if settled {
-                self.mean_log += log_longer;
-                self.step = longer(self.step);
-            } else {
-                // The step size is searched for again at the next transition, since the new
-                // metric may differ from the last by tens of orders of magnitude.
-                (self.bias, self.rounds, self.step) = (0.0, 0.0, 0.0);
-            }
+            // The step size is searched for again at the next transition, since the new
+            // metric may differ from the last by tens of orders of magnitude.
+            let log_step = libm::log(self.averaged.max(f64::MIN_POSITIVE)) + log_longer;
+            self.averaged = libm::exp(log_step.clamp(SHORTEST, LONGEST));
+            (self.bias, self.rounds, self.step) = (0.0, 0.0, 0.0);
         }
     }
 
     /// Ends a window: it gives the metric of the choices that it saw often enough. Returns
     /// the log of the factor by which a step has to grow to stay as long as it was, in the
-    /// geometric mean over all coordinates, and whether the metric has settled.
-    fn close(&mut self) -> (f64, bool) {
+    /// geometric mean over all coordinates.
+    fn close(&mut self) -> f64 {
         for (hash, moments) in std::mem::take(&mut self.states) {
             let before = self.learnt.get(&hash);
             if let Some(masses) = moments.variances(before) {
@@ -240,11 +226,7 @@ impl Adaptation {
         self.mixing = (self.signature.clone(), mixing);
         let metric = self.metric();
         let before = std::mem::replace(&mut self.metric, metric);
-        let log_longer =
-            (before.log_size - self.metric.log_size) / before.dimensions().max(1) as f64;
-        let same = |(a, b): (&f64, &f64)| (a / b).max(b / a) < SETTLED;
-        let settled = before.scales.iter().zip(&self.metric.scales).all(same);
-        (log_longer, settled && log_longer.abs() < libm::log(SETTLED))
+        (before.log_size - self.metric.log_size) / before.dimensions().max(1) as f64
     }
 
     /// The metric of the present choices, with the map of the last window if that was about
@@ -341,27 +323,5 @@ mod tests {
         assert_eq!(adaptation.step, 0.0);
         let length = adaptation.averaged * adaptation.metric.scales[0];
         assert!((length / 1e-30 - 1.0).abs() < 1e-6, "{length}");
-    }
-
-    #[test]
-    fn dual_averaging_goes_on_unless_the_metric_changes_much() {
-        for (scale, goes_on) in [(2.0, true), (0.5, false)] {
-            let mut adaptation = Adaptation::new(0.8, None);
-            adaptation.signature = vec![(7, 1)];
-            adaptation.metric = Metric::new(vec![scale], &Mixing::default());
-            adaptation.mean_log = libm::log(3.0);
-            // The window finds a scale of 1.4.
-            for i in 0..BURN + WINDOW {
-                adaptation.learn(0.8, &[f64::from(i % 5)], &[0.0]);
-            }
-            assert_eq!(adaptation.rounds > 0.0, goes_on);
-            let length = adaptation.averaged * adaptation.metric.scales[0];
-            assert!((length / (3.0 * scale) - 1.0).abs() < 1e-9, "{length}");
-            adaptation.learn(0.8, &[0.0], &[0.0]);
-            if goes_on {
-                let next = adaptation.step * adaptation.metric.scales[0];
-                assert!((next / (3.0 * scale) - 1.0).abs() < 1e-9, "{next}");
-            }
-        }
     }
 }
