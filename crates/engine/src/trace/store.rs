@@ -89,11 +89,6 @@ impl Store {
         self.nodes.get(n.index())
     }
 
-    /// Returns all nodes.
-    pub fn nodes_mut(&mut self) -> &mut [Node] {
-        &mut self.nodes
-    }
-
     /// Iterates over the nodes.
     pub fn nodes(&self) -> impl Iterator<Item = (NodeId, &Node)> {
         self.nodes.iter().enumerate().map(|(i, node)| (NodeId::new(i), node))

@@ -3,7 +3,7 @@
 //! invalidated, evaluated or journaled.
 
 use crate::lang::builtins::CovarianceValue;
-use crate::lang::code::{Op, Operand};
+use crate::lang::code::{Code, Op, Operand};
 use crate::lang::tape::{Form, ScoreSums, ScoreTerms, Scored, Tape};
 use crate::lang::value::Value;
 use crate::trace::Trace;
@@ -11,7 +11,7 @@ use crate::trace::graph::Graph;
 use crate::trace::node::*;
 use crate::trace::store::Store;
 use pcadlang_numerics::num::ExactSum;
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 use std::sync::Arc;
 
@@ -28,14 +28,13 @@ pub(in crate::trace) struct InPlace {
     besides: Vec<(Given, NodeId, Besides)>,
     /// Nodes that contribute to the score, and where their terms are on the tape.
     scores: Vec<(Given, NodeId, Scored)>,
-    /// Those of the values, and of the scores of the prior and of the likelihood, that are one
-    /// number on the tape. Apart from the others because there are thousands where choices are
-    /// summed out of a loop.
+    /// Those of the values, and of the scores, that are one number on the tape. Apart from
+    /// the others because there are thousands where choices are summed out of a loop.
     number_values: Vec<OneNumber>,
-    number_scores: [Vec<OneNumber>; 2],
-    /// Terms that change.
-    old: Vec<f64>,
-    new: Vec<f64>,
+    number_scores: Vec<OneNumber>,
+    /// Terms of the prior and of the likelihood that change.
+    old: [Vec<f64>; 2],
+    new: [Vec<f64>; 2],
     each: Vec<f64>,
     made: Vec<Value>,
     columns: FxHashMap<usize, Vec<f64>>,
@@ -62,19 +61,10 @@ impl OneNumber {
         }
     }
 
-    /// The node, and its number, if the choice has this value and the node exists.
+    /// True if the choice has this value.
     #[inline]
-    fn of<'a>(
-        &self,
-        nodes: &'a mut [Node],
-        numbers: &[f64],
-        values: &[usize],
-    ) -> Option<(&'a mut Node, f64)> {
-        if self.choice != NONE && values.get(self.choice as usize) != Some(&(self.value as usize)) {
-            return None;
-        }
-        let node = nodes.get_mut(self.node.index()).filter(|n| n.state == State::Clean)?;
-        Some((node, *numbers.get(self.at as usize)?))
+    fn applies(&self, values: &[usize]) -> bool {
+        self.choice == NONE || values.get(self.choice as usize) == Some(&(self.value as usize))
     }
 }
 
@@ -122,23 +112,13 @@ impl InPlace {
         fits
     }
 
-    /// Adds the score of a node; false if the node keeps another kind of score.
-    pub fn add_score(&mut self, graph: &Store, n: NodeId, given: Given, scored: Scored) -> bool {
-        let is_one = matches!(scored, Scored::Numbers(_, false)) && given.len() <= 1;
-        let fits = !is_one || takes_one(graph.op(n), graph[n].side.as_deref());
+    /// Adds the score of a node.
+    pub fn add_score(&mut self, n: NodeId, given: Given, scored: Scored) {
         self.scores.push((given, n, scored));
-        fits
-    }
-
-    /// The nodes to which the tape gives anything else than one number.
-    pub fn others(&self) -> FxHashSet<NodeId> {
-        let values = self.values.iter().map(|(_, n, _)| *n);
-        let besides = self.besides.iter().map(|(_, n, _)| *n);
-        values.chain(besides).chain(self.scores.iter().map(|(_, n, _)| *n)).collect()
     }
 
     /// Everything where the complete tape has it.
-    pub fn on(mut self, graph: &Store, tape: &Tape) -> InPlace {
+    pub fn on(mut self, tape: &Tape) -> InPlace {
         self.values.iter_mut().for_each(|(_, _, form)| *form = tape.place_of(form));
         self.scores.iter_mut().for_each(|(_, _, at)| *at = tape.place_of_score(at));
         self.besides.iter_mut().for_each(|(_, _, besides)| match besides {
@@ -156,7 +136,7 @@ impl InPlace {
         self.scores.retain(|(given, n, scored)| {
             let Scored::Numbers(run, false) = scored else { return true };
             let one = OneNumber::new(given, *n, run.start);
-            numbers[usize::from(!graph.slot_facts(*n).is_draw)].extend(one);
+            numbers.extend(one);
             one.is_none()
         });
         self
@@ -173,20 +153,27 @@ impl InPlace {
                 self.made.push(value);
             }
         }
-        self.scores.iter().filter(|(given, n, _)| holds(graph, given, *n, values)).all(
-            |(_, n, scored)| {
-                let terms = tape.terms(scored, &mut self.each, &mut self.columns);
-                let node = &graph.store[*n];
-                match (graph.op(*n), node.side.as_deref(), terms) {
-                    (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
-                        c.scores.len() == self.each.len() && c.elements != NONE
+        let one = |s: &OneNumber| {
+            let node = &graph.store[s.node];
+            !s.applies(values)
+                || node.state != State::Clean
+                || takes_one(graph.op(s.node), node.side.as_deref())
+        };
+        self.number_scores.iter().all(one)
+            && self.scores.iter().filter(|(given, n, _)| holds(graph, given, *n, values)).all(
+                |(_, n, scored)| {
+                    let terms = tape.terms(scored, &mut self.each, &mut self.columns);
+                    let node = &graph.store[*n];
+                    match (graph.op(*n), node.side.as_deref(), terms) {
+                        (Op::Draw { .. }, Some(Side::Choice(c)), Some(ScoreTerms::Each)) => {
+                            c.scores.len() == self.each.len() && c.elements != NONE
+                        }
+                        (Op::Observe { .. }, Some(Side::Total(_)), Some(_)) => true,
+                        (op, side, Some(ScoreTerms::One(_))) => takes_one(op, side),
+                        _ => false,
                     }
-                    (Op::Observe { .. }, Some(Side::Total(_)), Some(_)) => true,
-                    (op, side, Some(ScoreTerms::One(_))) => takes_one(op, side),
-                    _ => false,
-                }
-            },
-        )
+                },
+            )
     }
 
     /// Moves the trace to the point of the tape's last run, after [`InPlace::fits`]. The
@@ -194,13 +181,15 @@ impl InPlace {
     pub fn apply(
         &mut self,
         graph: &mut Graph,
+        code: &Code,
         tape: &Tape,
         values: &[usize],
         before: Option<&ScoreSums>,
     ) {
-        let (nodes, numbers) = (graph.store.nodes_mut(), tape.all_numbers());
         for v in &self.number_values {
-            if let Some((node, now)) = v.of(nodes, numbers, values) {
+            let node = &mut graph.store[v.node];
+            if v.applies(values) && node.state == State::Clean {
+                let now = tape.number(v.at as usize);
                 match &mut node.value {
                     Value::Num(x) => *x = now,
                     other => *other = Value::Num(now),
@@ -270,7 +259,7 @@ impl InPlace {
             }
         }
         drop(made);
-        self.put_number_scores(graph, tape, values, [&mut old, &mut new]);
+        self.put_number_scores((graph, code, tape), values, [&mut old, &mut new]);
         let (new, old) = match before {
             Some(before) => (tape.sums(), before),
             None => (&new, &old),
@@ -283,34 +272,35 @@ impl InPlace {
     /// present ones, where they differ, to the sums.
     fn put_number_scores(
         &mut self,
-        graph: &mut Graph,
-        tape: &Tape,
+        (graph, code, tape): (&mut Graph, &Code, &Tape),
         values: &[usize],
         [old, new]: [&mut ScoreSums; 2],
     ) {
-        let (nodes, numbers) = (graph.store.nodes_mut(), tape.all_numbers());
-        let sums = [(&mut old.prior, &mut new.prior), (&mut old.likelihood, &mut new.likelihood)];
-        for (scores, (old, new)) in self.number_scores.iter().zip(sums) {
-            self.old.clear();
-            self.new.clear();
-            for s in scores {
-                let Some((node, score)) = s.of(nodes, numbers, values) else { continue };
-                match node.side.as_deref_mut() {
-                    Some(Side::Total(t)) => {
-                        if node.score == 0.0 {
-                            old.merge(&t.sum);
-                        }
-                        t.sum = ExactSum::default();
-                    }
-                    _ if node.score.to_bits() == score.to_bits() => continue,
-                    _ => {}
-                }
-                self.old.push(node.score);
-                self.new.push(score);
-                node.score = score;
+        self.old.iter_mut().chain(&mut self.new).for_each(Vec::clear);
+        for s in &self.number_scores {
+            let node = &mut graph.store[s.node];
+            if !s.applies(values) || node.state != State::Clean {
+                continue;
             }
-            old.add_all(&self.old);
-            new.add_all(&self.new);
+            let score = tape.number(s.at as usize);
+            let likelihood = usize::from(!matches!(code.ops[node.op], Op::Draw { .. }));
+            match node.side.as_deref_mut() {
+                Some(Side::Total(t)) => {
+                    if node.score == 0.0 {
+                        old.likelihood.merge(&t.sum);
+                    }
+                    t.sum = ExactSum::default();
+                }
+                _ if node.score.to_bits() == score.to_bits() => continue,
+                _ => {}
+            }
+            self.old[likelihood].push(node.score);
+            self.new[likelihood].push(score);
+            node.score = score;
+        }
+        for (sums, terms) in [(old, &self.old), (new, &self.new)] {
+            sums.prior.add_all(&terms[0]);
+            sums.likelihood.add_all(&terms[1]);
         }
     }
 }

@@ -8,7 +8,6 @@
 //! distributions and likelihoods their gradients, and supports those of their transforms.
 
 mod calls;
-mod flips;
 mod in_place;
 mod record;
 mod recording;

@@ -56,7 +56,7 @@ impl Trace {
         r.put_scores(&Given::new());
         r.put_values(|_| Some(Given::new()));
         let tape = r.recorded.tape.finish();
-        let in_place = r.recorded.in_place.map(|in_place| in_place.on(&self.graph, &tape));
+        let in_place = r.recorded.in_place.map(|in_place| in_place.on(&tape));
         Some((tape, in_place))
     }
 
@@ -229,10 +229,10 @@ impl Recorder<'_> {
     /// Does the same with the scores recorded since the last call, which are these for
     /// some values of choices that are summed out.
     pub fn put_scores(&mut self, given: &Given) {
-        let (graph, mut scored) = (self.view.graph, self.scored.drain(..));
-        self.recorded.in_place.take_if(|in_place| {
-            !scored.all(|(n, scored)| in_place.add_score(graph, n, given.clone(), scored))
-        });
+        let scored = self.scored.drain(..);
+        if let Some(in_place) = &mut self.recorded.in_place {
+            scored.for_each(|(n, scored)| in_place.add_score(n, given.clone(), scored));
+        }
     }
 
     /// Notes where the score of a node is: what was recorded since `mark`.

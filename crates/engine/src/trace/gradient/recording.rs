@@ -5,7 +5,6 @@
 //! is a function of reports that ([`Recording::moved`]). A clone of a trace has its own
 //! identity.
 
-use super::flips::{Flips, FromTo};
 use super::in_place::InPlace;
 use crate::lang::tape::{ScoreSums, Tape};
 use crate::trace::{Change, Draws, NONE, Target, Trace, Weight};
@@ -20,8 +19,6 @@ use std::sync::Arc;
 pub struct Recording {
     tape: Tape,
     in_place: Option<InPlace>,
-    /// How the choices summed out are changed in place, if they can be.
-    flips: Option<Flips>,
     targets: Vec<Target>,
     identity: Arc<()>,
     revision: u64,
@@ -31,9 +28,8 @@ pub struct Recording {
     here: Option<Vec<f64>>,
     summed: SummedChoices,
     /// The indices of the values that the choices summed out have in the trace, if it is
-    /// still at this revision, and which of them change.
-    drawn: (u64, Vec<usize>),
-    changes: Vec<FromTo>,
+    /// still at this revision.
+    drawn: Option<(u64, Vec<usize>)>,
 }
 
 /// Finite choices that are summed out of a recorded density.
@@ -53,11 +49,6 @@ impl SummedChoices {
     fn at<'a>(&'a self, indices: &'a [usize]) -> impl Iterator<Item = (Target, &'a Datum)> {
         let values = self.values.iter().zip(indices).map(|(values, i)| &values[*i]);
         self.sites.iter().copied().zip(values)
-    }
-
-    /// A choice and the value that a change gives it.
-    fn changed(&self, (choice, _, to): FromTo) -> (Target, &Datum) {
-        (self.sites[choice as usize], &self.values[choice as usize][to as usize])
     }
 }
 
@@ -81,9 +72,7 @@ impl Recording {
         targets: &[Target],
         summed: SummedChoices,
     ) -> Recording {
-        let with_flips = in_place.as_ref().filter(|_| !summed.sites.is_empty());
         Recording {
-            flips: with_flips.map(|in_place| Flips::new(in_place.others())),
             tape,
             in_place,
             targets: targets.to_vec(),
@@ -92,8 +81,7 @@ impl Recording {
             start: ScoreSums::default(),
             here: None,
             summed,
-            drawn: (u64::MAX, Vec::new()),
-            changes: Vec::new(),
+            drawn: None,
         }
     }
 
@@ -207,7 +195,7 @@ impl Recording {
         let moved =
             self.tape.run_at_images(y, here) && in_place.fits(&trace.graph, &self.tape, &[]);
         if moved {
-            in_place.apply(&mut trace.graph, &self.tape, &[], Some(&self.start));
+            in_place.apply(&mut trace.graph, &trace.code, &self.tape, &[], Some(&self.start));
             trace.keep_moved(&self.targets, self.tape.coarse(here));
             self.start.clone_from(self.tape.sums());
             self.revision = trace.graph.revision;
@@ -217,8 +205,9 @@ impl Recording {
     }
 
     /// Gives the choices that are summed out a draw from their conditional at these
-    /// coordinates, or where the trace is, and moves the trace there in place, as
-    /// [`Recording::move_to`] does. False, with the trace unchanged, if that is not possible.
+    /// coordinates, or where the trace is, by an update of those that change, and moves the
+    /// trace there in place, as [`Recording::move_to`] does. False, with the trace
+    /// unchanged, if that is not possible.
     pub fn draw_and_move_to(
         &mut self,
         trace: &mut Trace,
@@ -237,97 +226,43 @@ impl Recording {
             return false;
         }
         let drawn = self.tape.draw(rng);
-        if !self.compare(trace, &drawn) {
+        let changed = self.changed(trace, &drawn);
+        // Where the trace is, these values may be impossible.
+        let possible = |w: Weight| w.appeared + w.vanished == 0 && w.log_joint.is_finite();
+        if !changed.is_empty() && !trace.propose(&changed, draws).is_ok_and(possible) {
+            trace.rollback();
             return false;
         }
-        let changes = !self.changes.is_empty();
-        let written = self.write_changes(trace, &drawn, draws);
-        if written && changes {
-            trace.keep_moved(&[], std::iter::empty());
-        } else if !written {
-            if !self.propose_changes(trace, draws) {
-                return false;
-            }
-            if y.is_some() && !self.fits(trace, &drawn) {
+        if y.is_some()
+            && let Some(in_place) = &mut self.in_place
+        {
+            if !in_place.fits(&trace.graph, &self.tape, &drawn) {
                 trace.rollback();
                 return false;
             }
             trace.commit();
-        }
-        if let Some(in_place) = &mut self.in_place
-            && (y.is_some() || written && changes)
-        {
-            in_place.apply(&mut trace.graph, &self.tape, &drawn, None);
-        }
-        if y.is_some() {
+            in_place.apply(&mut trace.graph, &trace.code, &self.tape, &drawn, None);
             trace.keep_moved(&self.targets, self.tape.coarse(here));
             self.start.clone_from(self.tape.sums());
         }
+        trace.commit();
         self.revision = trace.graph.revision;
-        self.drawn = (self.revision, drawn);
+        self.drawn = Some((self.revision, drawn));
         self.here = Some(here.clone());
         true
     }
 
-    /// Finds the changes to the values with these indices; false if the trace has others than
-    /// are known.
-    fn compare(&mut self, trace: &Trace, drawn: &[usize]) -> bool {
-        let (revision, now) = &mut self.drawn;
-        if *revision != trace.graph.revision || !Arc::ptr_eq(&self.identity, &trace.identity) {
-            let all = self.summed.sites.iter().zip(&self.summed.values);
-            let index = |(t, values): (&Target, &Vec<Datum>)| {
-                let here = trace.stored(*t)?;
-                values.iter().position(|x| *x == here)
-            };
-            let Some(found) = all.map(index).collect() else { return false };
-            *now = found;
-        }
-        let all = now.iter().zip(drawn).enumerate().filter(|(_, (from, to))| from != to);
-        self.changes.clear();
-        self.changes.extend(all.map(|(i, (from, to))| (i as u32, *from as u32, *to as u32)));
-        true
-    }
-
-    /// Writes the changes without an update; false, with the trace unchanged, if that is not
-    /// possible.
-    fn write_changes(&mut self, trace: &mut Trace, drawn: &[usize], draws: Draws) -> bool {
-        let Some(flips) = &mut self.flips else { return false };
-        for change in &self.changes {
-            match flips.learn(trace, *change, self.summed.changed(*change), draws) {
-                Some(true) => {}
-                Some(false) => return false,
-                None => {
-                    self.flips = None;
-                    return false;
-                }
-            }
-        }
-        self.fits(trace, drawn)
-            && self.flips.as_ref().is_some_and(|f| f.write(&mut trace.graph, &self.changes))
-    }
-
-    /// The number of changes learnt so far; `None` if they cannot be written.
-    #[cfg(test)]
-    pub fn learnt(&self) -> Option<usize> {
-        self.flips.as_ref().map(Flips::len)
-    }
-
-    /// True if the trace can take everything from the tape.
-    fn fits(&mut self, trace: &Trace, drawn: &[usize]) -> bool {
-        self.in_place.as_mut().is_some_and(|i| i.fits(&trace.graph, &self.tape, drawn))
-    }
-
-    /// Proposes the changes; false, with the trace unchanged, if they are not possible where
-    /// it is.
-    fn propose_changes(&self, trace: &mut Trace, draws: Draws) -> bool {
+    /// The changes that give the choices summed out the values with these indices.
+    fn changed(&self, trace: &Trace, drawn: &[usize]) -> Vec<(Target, Change)> {
         let set = |(t, x): (Target, &Datum)| (t, Change::Set(x.clone()));
-        let all: Vec<_> = self.changes.iter().map(|c| set(self.summed.changed(*c))).collect();
-        let possible = |w: Weight| w.appeared + w.vanished == 0 && w.log_joint.is_finite();
-        let there = all.is_empty() || trace.propose(&all, draws).is_ok_and(possible);
-        if !there {
-            trace.rollback();
+        let all = self.summed.at(drawn);
+        match &self.drawn {
+            Some((revision, now)) if *revision == trace.graph.revision && self.holds(trace) => {
+                let differs = now.iter().zip(drawn).map(|(now, drawn)| now != drawn);
+                all.zip(differs).filter(|(_, differs)| *differs).map(|(one, _)| set(one)).collect()
+            }
+            _ => all.filter(|(t, x)| trace.stored(*t).as_ref() != Some(*x)).map(set).collect(),
         }
-        there
     }
 
     /// Returns the log Jacobian in the state to which densities are relative.
