@@ -375,3 +375,18 @@ fn cameras() {
     assert_session("camera", &text.join("\n"));
     assert!(f.files().contains(&"axes.png".to_owned()));
 }
+
+/// A constant of another crate's bytes had one of them twice, 7.5 MB.
+#[test]
+fn the_program_has_each_network_once() {
+    let program = std::fs::read(env!("CARGO_BIN_EXE_pcadlang")).unwrap();
+    for name in [
+        "nanodet/nanodet.bin",
+        "detectors/pose_detection.tflite",
+        "detectors/pose_landmark_full.tflite",
+    ] {
+        let network = std::fs::read(format!("crates/{name}")).unwrap();
+        let part = &network[network.len() / 2..][..64];
+        assert_eq!(program.windows(64).filter(|w| *w == part).count(), 1, "{name}");
+    }
+}

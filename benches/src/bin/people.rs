@@ -141,7 +141,7 @@ fn main() -> Result<(), String> {
         let bytes = std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?;
         let photo = photo::decode(&bytes, &Limits::default()).map_err(|e| e.to_string())?;
         let wide = ObjectOptions { least: 0.05, most: usize::MAX };
-        let seen = ObjectFinder::INCLUDED.find_in_views(&photo, VIEWS_OF_PEOPLE, &wide);
+        let seen = ObjectFinder::included().find_in_views(&photo, VIEWS_OF_PEOPLE, &wide);
         let seen = seen.map_err(|e| e.to_string())?;
         let options = FindOptions { most: 20, sure, ..FindOptions::default() };
         let people = finder.find(&photo, Search::Everywhere(&seen), &options, 0);

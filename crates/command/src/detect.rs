@@ -161,7 +161,7 @@ fn objects_in(
     views: &[View],
     options: &ObjectOptions,
 ) -> Result<Vec<FoundObject>, Failure> {
-    ObjectFinder::INCLUDED.find_in_views(photo, views, options).map_err(|e| plain(e.to_string()))
+    ObjectFinder::included().find_in_views(photo, views, options).map_err(|e| plain(e.to_string()))
 }
 
 /// The photograph's name without its folder.

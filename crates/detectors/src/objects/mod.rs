@@ -94,12 +94,14 @@ pub struct ObjectFinder {
 }
 
 impl ObjectFinder {
-    /// The one included in the program.
-    pub const INCLUDED: ObjectFinder =
-        ObjectFinder::new(pcadlang_nanodet::MODEL, pcadlang_nanodet::WEIGHTS);
+    /// Returns the one included in the program. It is no constant, since such a one has the files
+    /// in it again.
+    pub fn included() -> ObjectFinder {
+        ObjectFinder::new(pcadlang_nanodet::MODEL, pcadlang_nanodet::WEIGHTS)
+    }
 
     /// Takes NanoDet as a graph model of TensorFlow.js: the bytes of its JSON and of its weights.
-    pub const fn new(model: &'static [u8], weights: &'static [u8]) -> ObjectFinder {
+    pub fn new(model: &'static [u8], weights: &'static [u8]) -> ObjectFinder {
         ObjectFinder { model, weights }
     }
 

@@ -78,7 +78,7 @@ fn found(photo: &Photo) -> Vec<FoundObject> {
 
 fn seen(photo: &Photo, view: View) -> Vec<FoundObject> {
     let options = ObjectOptions::default();
-    ObjectFinder::INCLUDED.find_in_views(photo, &[view], &options).unwrap()
+    ObjectFinder::included().find_in_views(photo, &[view], &options).unwrap()
 }
 
 #[test]

@@ -49,7 +49,7 @@ pub(super) fn found(image: &ImageValue, views: &[View]) -> Result<Arc<Vec<FoundO
     image.prepared().get(Viewed(views.to_vec()), |Viewed(views)| {
         let Some(photo) = image.as_photo() else { return Ok(Vec::new()) };
         let options = ObjectOptions { least: LEAST, most: usize::MAX };
-        let found = ObjectFinder::INCLUDED.find_in_views(photo, views, &options);
+        let found = ObjectFinder::included().find_in_views(photo, views, &options);
         found.map_err(|e| Fault::new(FaultKind::Other, format!("scene.objects: {e}")))
     })
 }
