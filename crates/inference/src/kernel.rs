@@ -379,10 +379,35 @@ pub(crate) fn accept_or_reject(
     log_ratio: f64,
     rng: &mut Stream,
 ) -> TraceResult<Outcome> {
-    let mut accepted = accepts(log_ratio, rng);
-    while accepted && let Some(change) = trace.next_stage() {
-        accepted = recoverable(change)?.is_some_and(|c| accepts(at.tempered_change(c), rng));
-    }
+    accept_or_reject_last(trace, at, log_ratio, rng, |_| Ok(0.0))
+}
+
+/// As [`accept_or_reject`], with a part of the log ratio that takes time, and is of the last test.
+///
+/// # Errors
+/// As [`accept_or_reject`], and that of `last`; the proposal is then rejected.
+pub(crate) fn accept_or_reject_last(
+    trace: &mut Trace,
+    at: &StepContext,
+    log_ratio: f64,
+    rng: &mut Stream,
+    last: impl FnOnce(&mut Trace) -> TraceResult<f64>,
+) -> TraceResult<Outcome> {
+    let (mut last, mut ratio) = (Some(last), log_ratio);
+    let accepted = loop {
+        if ratio > f64::NEG_INFINITY
+            && !trace.observations_wait()
+            && let Some(last) = last.take()
+        {
+            ratio += last(trace).inspect_err(|_| trace.rollback())?;
+        }
+        if !accepts(ratio, rng) {
+            break false;
+        }
+        let Some(change) = trace.next_stage() else { break true };
+        let Some(change) = recoverable(change)? else { break false };
+        ratio = at.tempered_change(change);
+    };
     Ok(end(trace, log_ratio, accepted))
 }
 

@@ -33,6 +33,11 @@ impl Trace {
         self.graph.update.late.pop();
     }
 
+    /// True if the pending proposal has observations that wait.
+    pub fn observations_wait(&self) -> bool {
+        !self.graph.update.waiting.is_empty()
+    }
+
     /// Evaluates the observations of the next stage in the pending proposal. Returns the change of
     /// the log likelihood by them; -∞ if the proposal changes which choices or observations there
     /// are, as the way back could have another first stage. `None` if nothing waits.
@@ -40,7 +45,7 @@ impl Trace {
     /// # Errors
     /// If the program fails there; the trace is then as before the proposal.
     pub fn next_stage(&mut self) -> Option<TraceResult<f64>> {
-        if self.graph.update.waiting.is_empty() {
+        if !self.observations_wait() {
             return None;
         }
         let before = self.update.take()?;

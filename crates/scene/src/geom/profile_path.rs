@@ -101,8 +101,9 @@ impl<T: Real> OuterPath<T> {
         ring: u16,
         mut number: impl FnMut(f64) -> T,
     ) -> Option<OuterPath<T>> {
-        let mut points: Vec<(T, T)> = Vec::new();
-        let mut labels: Vec<u16> = Vec::new();
+        let count = parts.iter().map(|p| p.r.len()).sum();
+        let mut points: Vec<(T, T)> = Vec::with_capacity(count);
+        let mut labels: Vec<u16> = Vec::with_capacity(count);
         for (i, p) in parts.iter().enumerate() {
             for (k, (r, y)) in p.r.iter().zip(&p.y).enumerate() {
                 let (r, y) = (number(*r), number(*y));
@@ -214,7 +215,8 @@ pub(super) fn inner_wall<T: Real>(
     let (mut at, mut above) = (start, last);
     let mut walls = Vec::new();
     for s in outer.iter().rev() {
-        let mut points = vec![at];
+        let mut points = Vec::with_capacity(s.points.len());
+        points.push(at);
         for (r, y) in s.points.iter().rev().skip(1) {
             if above.1.value() <= down_to.value() {
                 break;

@@ -51,7 +51,9 @@ pub struct Revolution {
 impl Revolution {
     /// From the path of a lathe, as it is swept into a mesh by [`super::revolve::revolve`].
     pub(super) fn new(strips: &[Strip], closed: bool, part_count: u16) -> Revolution {
-        let (mut rings, mut spans, mut rims) = (Vec::new(), Vec::new(), Vec::new());
+        let points = strips.iter().map(|s| s.points.len()).sum();
+        let (mut rings, mut spans) = (Vec::with_capacity(points), Vec::with_capacity(points));
+        let mut rims = Vec::with_capacity(strips.len() + 1);
         let mut before: Option<usize> = None;
         for (i, s) in strips.iter().enumerate() {
             let first = rings.len();

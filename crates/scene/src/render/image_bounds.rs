@@ -52,7 +52,7 @@ fn ring_box(r: &PlacedRevolution, ring: &Ring, camera: &Camera) -> Option<Bounds
     // Along each axis of the camera: the centre, and the factors of cosine and sine.
     let along = |axis: DVec3| [centre.dot(axis), u.dot(axis), v.dot(axis)];
     let [x, y, depth] = [camera.right, camera.up, camera.forward].map(along);
-    let nearest = depth[0] - libm::hypot(depth[1], depth[2]);
+    let nearest = depth[0] - (depth[1] * depth[1] + depth[2] * depth[2]).sqrt();
     if nearest.is_nan() || nearest <= Camera::NEAR {
         return None;
     }
@@ -61,7 +61,8 @@ fn ring_box(r: &PlacedRevolution, ring: &Ring, camera: &Camera) -> Option<Bounds
             (ratios(&x, &depth), ratios(&y, &depth), focal_px, cx, cy)
         }
         Projection::Orthographic { units_per_pixel, cx, cy } => {
-            let ends = |a: &[f64; 3]| [-1.0, 1.0].map(|s| a[0] + s * libm::hypot(a[1], a[2]));
+            let ends =
+                |a: &[f64; 3]| [-1.0, 1.0].map(|s| a[0] + s * (a[1] * a[1] + a[2] * a[2]).sqrt());
             (ends(&x), ends(&y), 1.0 / units_per_pixel, cx, cy)
         }
     };

@@ -197,7 +197,7 @@ impl ContourRatio {
     /// [`ContourRatio::log_likelihood`] without allocation once the scratch has grown.
     pub fn log_likelihood_with(&self, elements: &ContourSlice<'_>, scratch: &mut Scratch) -> f64 {
         scratch.begin(self.capacity.groups());
-        self.count(elements, 1, scratch);
+        self.count(elements, 1.0, scratch);
         self.score(scratch)
     }
 
@@ -216,25 +216,25 @@ impl ContourRatio {
         }
         if !step.leads_to(scratch.of.as_ref()) {
             if step.follows(scratch.of.as_ref()) {
-                self.count(&step.removed.slice(), -1, scratch);
-                self.count(&step.added.slice(), 1, scratch);
+                self.count(&step.removed.slice(), -1.0, scratch);
+                self.count(&step.added.slice(), 1.0, scratch);
             } else {
                 scratch.begin(self.capacity.groups());
-                self.count(&whole(), 1, scratch);
-                self.count(&step.moving.slice(), -1, scratch);
+                self.count(&whole(), 1.0, scratch);
+                self.count(&step.moving.slice(), -1.0, scratch);
             }
             scratch.of = Some(step.to.clone());
         }
         scratch.score_matches(&self.capacity);
         let before = scratch.savepoint();
-        self.count(&step.moving.slice(), 1, scratch);
+        self.count(&step.moving.slice(), 1.0, scratch);
         let score = self.score(scratch);
         scratch.restore(before);
         score
     }
 
     /// Adds (`sign` 1) or subtracts (-1) the contributions of elements.
-    fn count(&self, elements: &ContourSlice<'_>, sign: i64, scratch: &mut Scratch) {
+    fn count(&self, elements: &ContourSlice<'_>, sign: f64, scratch: &mut Scratch) {
         vectorised(
             #[inline(always)]
             || {
@@ -250,7 +250,7 @@ impl ContourRatio {
     }
 
     #[inline(always)]
-    fn count_placed(&self, places: &Places, sign: i64, scratch: &mut Scratch) {
+    fn count_placed(&self, places: &Places, sign: f64, scratch: &mut Scratch) {
         let samples = self.grid.width as usize * self.grid.height as usize;
         let [right, below] = self.grid.steps();
         // Integer sums are exact: a sum of individually rounded terms does not depend on
@@ -260,8 +260,8 @@ impl ContourRatio {
             if places.length[i] <= 0.0 {
                 continue;
             }
-            let weight = (f64::from(places.length[i]) * self.percent).min(LONGEST);
-            length = length.saturating_add(sign * fixed(weight));
+            let weight = sign * (f64::from(places.length[i]) * self.percent).min(LONGEST);
+            length = length.saturating_add(fixed(weight));
             let low = places.channel[i] as usize;
             let high = if low + 1 < CHANNELS { low + 1 } else { 0 };
             let mut cells = [Cell::NOTHING; 8];
@@ -277,14 +277,14 @@ impl ContourRatio {
             let shares = places.shares(i);
             // Nearly everywhere they are of one group.
             let unmatched = if other != 0 {
-                scratch.share(&cells, &shares, weight, sign)
+                scratch.share(&cells, &shares, weight)
             } else {
                 let score = cells.iter().zip(&shares).fold(0.0, |sum, (c, s)| sum + c.score * s);
-                let score = sign * fixed(weight * f64::from(score));
+                let score = fixed(weight * f64::from(score));
                 if group == NO_GROUP {
                     score
                 } else {
-                    scratch.assign(group, [sign * fixed(weight), score]);
+                    scratch.assign(group, [fixed(weight), score]);
                     0
                 }
             };
@@ -494,12 +494,12 @@ impl Scratch {
     /// Assigns a length of contour to the groups of the cells around it, by their shares.
     /// Returns the score of what belongs to no group.
     #[inline(always)]
-    fn share(&mut self, cells: &[Cell; 8], shares: &[f32; 8], whole: f64, sign: i64) -> i64 {
+    fn share(&mut self, cells: &[Cell; 8], shares: &[f32; 8], whole: f64) -> i64 {
         let (mut lengths, mut scores) = ([0; 8], [0; 8]);
         for i in 0..8 {
             let length = whole * f64::from(shares[i]);
-            lengths[i] = sign * fixed(length);
-            scores[i] = sign * fixed(length * f64::from(cells[i].score));
+            lengths[i] = fixed(length);
+            scores[i] = fixed(length * f64::from(cells[i].score));
         }
         // Neighbouring samples mostly belong to one group.
         let (mut unmatched, mut group, mut given) = (0, NO_GROUP, [0; 2]);

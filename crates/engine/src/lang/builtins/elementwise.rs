@@ -50,12 +50,12 @@ pub(super) fn binary(a: &Args, f: fn(f64, f64) -> f64) -> Result<Value, Fault> {
 }
 
 /// Applies a function of two numbers to numbers or arrays; `other` handles pairs in which
-/// one value is neither.
+/// one value is neither. A function that is known here is applied to several numbers at a time.
 pub(super) fn numeric(
     a: &Args,
     x: &Value,
     y: &Value,
-    f: fn(f64, f64) -> f64,
+    f: impl Fn(f64, f64) -> f64 + Copy,
     other: Pairing<'_>,
 ) -> Result<Value, Fault> {
     match (x, y) {

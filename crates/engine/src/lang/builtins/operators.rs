@@ -119,7 +119,7 @@ pub(super) const TABLE: &[Row] = &[
 ];
 
 fn add(a: &Args) -> Result<Value, Fault> {
-    numeric(a, a.get(0), a.get(1), elementwise::of_two(a), &|x, y| match (x, y) {
+    numeric(a, a.get(0), a.get(1), |x, y| x + y, &|x, y| match (x, y) {
         (Value::Str(x), Value::Str(y)) => {
             a.fits(x.len() + y.len())?;
             Ok(Value::Str(format!("{x}{y}").into()))
@@ -132,7 +132,7 @@ fn add(a: &Args) -> Result<Value, Fault> {
 }
 
 fn multiply(a: &Args) -> Result<Value, Fault> {
-    numeric(a, a.get(0), a.get(1), elementwise::of_two(a), &|x, y| {
+    numeric(a, a.get(0), a.get(1), |x, y| x * y, &|x, y| {
         let product = if let Value::Object(o) = x { o.multiply(y) } else { None };
         product.unwrap_or_else(|| Err(unsuited(a, "numbers", x, y)))
     })

@@ -166,32 +166,54 @@ impl Face {
     }
 }
 
-/// How much nearer than the start of a silhouette's chord the span that it lies in
-/// reaches, in scene units. `from` and `to` are the chord's ends, as x, y and nearness.
+/// How much nearer than the starts of silhouettes' chords from a sample on the spans that they
+/// lie in reach, in scene units.
+#[inline(always)]
 pub(super) fn reach(
     surface: &Revolution,
     sight: &Sight,
-    span: u32,
-    angle: [f64; 2],
-    [from, to]: [[f64; 3]; 2],
-) -> f64 {
-    let ends = surface.spans().get(span as usize).and_then(|s| surface.ends(s));
-    let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
-    let square = dx * dx + dy * dy;
-    if square < 0.02 * 0.02 {
-        return 0.0;
-    }
-    let steep = (to[2] - from[2]) / square;
-    let mut most = 0.0f64;
-    for ring in ends.into_iter().flatten() {
-        let p = glam::DVec3::new(ring.r * angle[0], ring.y, ring.r * angle[1]);
-        let at = sight.camera(p);
-        if -at.z < Camera::NEAR {
-            return 0.0;
+    samples: &Samples,
+    first: usize,
+    Chords { from, to, .. }: &Chords,
+    side: usize,
+) -> Row {
+    // Radius and height of both rings of each span.
+    let (mut rings, mut there) = ([[[0.0; LANES]; 2]; 2], [0; LANES]);
+    let spans = samples.spans.get(first..).unwrap_or(&[]);
+    for (i, span) in spans.iter().take(LANES).enumerate() {
+        let ends = surface.spans().get(*span as usize).and_then(|s| surface.ends(s));
+        for (ring, [r, y]) in ends.into_iter().flatten().zip(&mut rings) {
+            (r[i], y[i], there[i]) = (ring.r, ring.y, u64::MAX);
         }
-        let p = sight.lens.point(at);
-        most =
-            most.max(p.nearness - from[2] - steep * ((p.x - from[0]) * dx + (p.y - from[1]) * dy));
     }
-    if sight.lens.pinhole { most / (from[2] * from[2]) } else { most }
+    let [x, _, z] = rows(&samples.points, first);
+    let sign = if side == 0 { 1.0 } else { -1.0 };
+    let [ax, ay, az] = sight.m.to_cols_array_2d();
+    let (t, lens) = (sight.t.to_array(), sight.lens);
+    let mut most = [0.0; LANES];
+    for [radius, height] in &rings {
+        for i in 0..LANES {
+            let r = (x[i] * x[i] + z[i] * z[i]).sqrt();
+            let (c, s) = if r > 0.0 { (x[i] / r, sign * z[i] / r) } else { (1.0, 0.0) };
+            let (p, q, r) = (radius[i] * c, height[i], radius[i] * s);
+            let u = p * ax[0] + q * ay[0] + r * az[0] + t[0];
+            let v = p * ax[1] + q * ay[1] + r * az[1] + t[1];
+            let w = p * ax[2] + q * ay[2] + r * az[2] + t[2];
+            there[i] &= mask(-w >= Camera::NEAR);
+            let nearness = if lens.pinhole { 1.0 / -w } else { w };
+            let k = if lens.pinhole { lens.scale * nearness } else { lens.scale };
+            let (u, v) = (lens.cx + k * u - from[0][i], lens.cy - k * v - from[1][i]);
+            let (dx, dy) = (to[0][i] - from[0][i], to[1][i] - from[1][i]);
+            let square = dx * dx + dy * dy;
+            there[i] &= mask(square >= 0.02 * 0.02);
+            let steep = (to[2][i] - from[2][i]) / square;
+            let reach = nearness - from[2][i] - steep * (u * dx + v * dy);
+            most[i] = if reach > most[i] { reach } else { most[i] };
+        }
+    }
+    for i in 0..LANES {
+        let per = if lens.pinhole { from[2][i] * from[2][i] } else { 1.0 };
+        most[i] = if there[i] != 0 { most[i] / per } else { 0.0 };
+    }
+    most
 }

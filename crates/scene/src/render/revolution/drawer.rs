@@ -197,10 +197,16 @@ impl Drawer<'_> {
         }
         let mut parts = Parts::default();
         for (side, chords) in sides.iter().enumerate() {
+            let mut divided = chords.there;
             for i in 0..LANES {
-                if cut[i] & chords.there[i] != 0 {
-                    self.cut(&mut parts, (first, side, i), chords, both, smooth);
-                }
+                divided[i] &= cut[i];
+            }
+            if !any(&divided) {
+                continue;
+            }
+            let slack = if smooth { [self.slack(first, chords, side); 2] } else { chords.slack };
+            for i in (0..LANES).filter(|i| divided[*i] != 0) {
+                self.cut(&mut parts, i, chords, slack.map(|row| row[i]), both);
             }
         }
         if parts.count > 0 {
@@ -265,14 +271,11 @@ impl Drawer<'_> {
         if !any(&hidden) {
             return;
         }
-        let mut again = Pieces { there: hidden, ..*pieces };
+        let slack = self.slack(first, chords, 0);
+        let mut again = Pieces { slack: [slack; 2], there: hidden, ..*pieces };
         for i in 0..LANES {
-            if hidden[i] != 0 {
-                let slack = self.slack(first + i, chords, i, 0);
-                (again.slack[0][i], again.slack[1][i]) = (slack, slack);
-                // Too little to matter.
-                again.there[i] = mask(slack > 0.1 * TOLERANCE * self.extent);
-            }
+            // Others are too little to matter.
+            again.there[i] &= mask(slack[i] > 0.1 * TOLERANCE * self.extent);
         }
         if any(&again.there) {
             let more = self.visible(&again, both);
@@ -282,17 +285,11 @@ impl Drawer<'_> {
         }
     }
 
-    /// How much nearer than a silhouette its own span reaches.
-    #[inline(never)]
-    fn slack(&self, sample: usize, chords: &Chords, i: usize, side: usize) -> f64 {
-        let at = |list: &Vec<f64>| list.get(sample).copied().unwrap_or(0.0);
-        let [x, _, z] = self.samples.points.each_ref().map(at);
-        let r = (x * x + z * z).sqrt();
-        let sign = if side == 0 { 1.0 } else { -1.0 };
-        let angle = if r > 0.0 { [x / r, sign * z / r] } else { [1.0, 0.0] };
-        let span = self.samples.spans.get(sample).copied().unwrap_or(LAST);
-        let ends = [&chords.from, &chords.to].map(|p| [p[0][i], p[1][i], p[2][i]]);
-        reach(self.surface, self.sight, span, angle, ends).min(SILHOUETTE_SLACK * self.extent)
+    /// How much nearer than silhouettes from a sample on their own spans reach.
+    #[inline(always)]
+    fn slack(&self, first: usize, chords: &Chords, side: usize) -> Row {
+        let most = SILHOUETTE_SLACK * self.extent;
+        reach(self.surface, self.sight, self.samples, first, chords, side).map(|r| r.min(most))
     }
 
     /// Adds chords that are single visible pieces.
@@ -352,16 +349,9 @@ impl Drawer<'_> {
     }
 
     /// Divides a chord that is long or leaves the image, and adds the visible pieces once there
-    /// are enough to test. `first`, `side` and `i` say which chord it is.
+    /// are enough to test.
     #[inline(never)]
-    fn cut(
-        &mut self,
-        parts: &mut Parts,
-        (first, side, i): (usize, usize, usize),
-        chords: &Chords,
-        both: bool,
-        smooth: bool,
-    ) {
+    fn cut(&mut self, parts: &mut Parts, i: usize, chords: &Chords, slack: [f64; 2], both: bool) {
         let [a, b] =
             [&chords.from, &chords.to].map(|p| Point { x: p[0][i], y: p[1][i], nearness: p[2][i] });
         let (dx, dy) = (b.x - a.x, b.y - a.y);
@@ -377,10 +367,6 @@ impl Drawer<'_> {
             return;
         }
         let tangent = chords.tangent.map(|row| row[i]);
-        let slack = match smooth {
-            true => [self.slack(first + i, chords, i, side); 2],
-            false => chords.slack.map(|row| row[i]),
-        };
         let count = if length < LONGEST { 1.0 } else { (length + 0.5).floor() };
         let step = (t1 - t0) / count;
         for k in 0..count as usize {

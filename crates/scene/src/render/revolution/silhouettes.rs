@@ -194,18 +194,18 @@ impl Samples {
     ) {
         let [begin, finish] = [piece.sample(from, start), piece.sample(to, end)];
         let angle = |v: [f64; 2]| libm::atan2(v[1], v[0]);
-        let (a, b) = (angle(start), angle(end));
-        let at = |part: f64| {
-            let angle = a + (b - a) * part;
-            let at = [libm::cos(angle), libm::sin(angle)];
+        let angle = angle(end) - angle(start);
+        let at = |at: [f64; 2]| {
             let t = piece.share(at[0]).clamp(from, to);
             piece.sample(if t.is_finite() { t } else { from }, at)
         };
-        let count = chords([&begin, &at(0.5), &finish], sight, whole);
+        let middle = at(turned(start, 0.5 * angle));
+        let count = chords([&begin, &middle, &finish], sight, whole);
         self.begin(span, &begin, count);
-        let step = 1.0 / count;
-        for i in 1..count as usize {
-            self.push(&at(i as f64 * step), span as u32);
+        let (step, mut direction) = (turned([1.0, 0.0], angle / count), start);
+        for _ in 1..count as usize {
+            direction = rotated(direction, step);
+            self.push(&at(direction), span as u32);
         }
         self.push(&finish, LAST);
     }
@@ -237,18 +237,29 @@ impl Samples {
             let first = self.count;
             self.reserve(count as usize + 1);
             let step = core::f64::consts::PI / count;
-            let (dc, ds) = (libm::cos(step), libm::sin(step));
-            let at = |c: f64, s: f64| Sample { c, s, r: ring.r, y: ring.y, nr: 1.0, ny: 0.0 };
-            let (mut c, mut s) = (1.0, 0.0);
-            self.push(&at(c, s), 0);
+            let step = turned([1.0, 0.0], step);
+            let at = |[c, s]: [f64; 2]| Sample { c, s, r: ring.r, y: ring.y, nr: 1.0, ny: 0.0 };
+            let mut direction = [1.0, 0.0];
+            self.push(&at(direction), 0);
             for _ in 1..count as usize {
-                (c, s) = (c * dc - s * ds, s * dc + c * ds);
-                self.push(&at(c, s), 0);
+                direction = rotated(direction, step);
+                self.push(&at(direction), 0);
             }
-            self.push(&at(-1.0, 0.0), LAST);
+            self.push(&at([-1.0, 0.0]), LAST);
             self.circles.push(Circle { first, past: self.count, rim: i });
         }
     }
+}
+
+/// A direction as cosine and sine, turned by an angle.
+fn turned(at: [f64; 2], angle: f64) -> [f64; 2] {
+    rotated(at, [libm::cos(angle), libm::sin(angle)])
+}
+
+/// A direction turned by that of another.
+#[inline(always)]
+fn rotated([c, s]: [f64; 2], [dc, ds]: [f64; 2]) -> [f64; 2] {
+    [c * dc - s * ds, s * dc + c * ds]
 }
 
 /// Sharp circles are left out if the width plus height of their image is less than this,
