@@ -57,17 +57,21 @@ fn proposals_of_the_program_change_structure() {
 /// choices appear, and of a randomly selected element.
 #[test]
 fn maps_of_the_program_are_paid_for() {
-    let d = run(
-        "assume x ~ normal(0, 1); observe normal(x, 0.5) = 2;
-         kernel scaled() { propose u ~ lognormal(0, 0.5); propose @x = value(@x) * u; propose u = 1 / u; }
-         kernel shifted(s) { propose u ~ normal(0, s); propose @x = value(@x) + u; propose u = -u; }
-         infer { warmup 500 { shifted(0.5); } repeat 40000 { scaled(); shifted(0.5); collect x; } }",
-        1,
-        2,
-    );
-    assert_mean("maps", &d["x"], 1.6, 0.06);
-    let squares: Vec<f64> = d["x"].iter().map(|x| (x - 1.6) * (x - 1.6)).collect();
-    assert_mean("maps, variance", &squares, 0.2, 0.03);
+    // All at once, and in three stages, of which the last one has the Jacobian.
+    for scaled in ["scaled()", "delayed(scaled(), at = @y, then = @z)"] {
+        let text = format!(
+            "assume x ~ normal(0, 1); observe normal(x, sqrt(0.75)) = 2;
+             observe normal(x, sqrt(0.75)) = 2 with coarse = flat() as y;
+             observe normal(x, sqrt(0.75)) = 2 with coarse = flat() as z;
+             kernel scaled() {{ propose u ~ lognormal(0, 0.5); propose @x = value(@x) * u; propose u = 1 / u; }}
+             kernel shifted(s) {{ propose u ~ normal(0, s); propose @x = value(@x) + u; propose u = -u; }}
+             infer {{ warmup 500 {{ shifted(0.5); }} repeat 40000 {{ {scaled}; shifted(0.5); collect x; }} }}"
+        );
+        let d = run(&text, 1, 2);
+        assert_mean(scaled, &d["x"], 1.6, 0.06);
+        let squares: Vec<f64> = d["x"].iter().map(|x| (x - 1.6) * (x - 1.6)).collect();
+        assert_mean(&format!("{scaled}, variance"), &squares, 0.2, 0.03);
+    }
     let d = run(
         "assume c ~ flip(0.4); assume a ~ normal(0, 1);
          assume x = if c { a + 1 } else { d ~ normal(0, 1); a + d - 1 };
