@@ -33,6 +33,26 @@ fn proposals_of_the_program_read_its_names() {
     }
 }
 
+/// The same while observations wait, also where the way back reads the new state: it is then
+/// made, and undone with what waits.
+#[test]
+fn proposals_of_the_program_are_paid_for_in_stages() {
+    for here in ["value(@x)", "value(@x) + none", "x"] {
+        let text = format!(
+            "let none = sum([1, -1]); assume x ~ normal(0, 1); observe normal(x, sqrt(0.75)) = 2;
+             observe normal(x, sqrt(0.75)) = 2 with coarse = flat() as y;
+             observe normal(x, sqrt(0.75)) = 2 with coarse = flat() as z;
+             kernel pull() {{ let here = {here}; propose @x ~ normal(0.7 * here + 1, 0.8); }}
+             kernel moves() {{ delayed(pull(), at = @y, then = @z); }}
+             infer {{ warmup 1000 {{ moves(); }} repeat 60000 {{ moves(); collect x; }} }}"
+        );
+        let d = run(&text, 1, 2);
+        assert_mean(here, &d["x"], 1.6, 0.06);
+        let squares: Vec<f64> = d["x"].iter().map(|x| (x - 1.6) * (x - 1.6)).collect();
+        assert_mean(&format!("{here}, variance"), &squares, 0.2, 0.03);
+    }
+}
+
 /// The same for a choice with which others appear and vanish, and for several choices at
 /// computed addresses.
 #[test]

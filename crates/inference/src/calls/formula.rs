@@ -68,11 +68,11 @@ pub(crate) fn evaluate(f: &Formula, env: &mut PlanEnv) -> Result<Value, Box<RunE
     match &f.kind {
         FormulaKind::Const(v) => Ok(v.clone()),
         FormulaKind::Given(given) => env.supplied(given, f.span),
-        FormulaKind::Function { block, given, is_closed, .. } => {
+        FormulaKind::Function { block, given, is_closed, is_settled } => {
             let args = given.iter().map(|g| env.supplied(g, f.span)).collect();
             let trace = match &mut env.moved {
                 None => &mut *env.trace,
-                Some(moved) if *is_closed => &mut *moved.aside,
+                Some(moved) if *is_closed || *is_settled => &mut *moved.aside,
                 Some(_) => return Err(unmapped(f.span)),
             };
             trace.call(*block, args, env.draws)

@@ -497,6 +497,9 @@ impl ProgramKernel {
             return Ok(Outcome::one(true));
         }
         trace.propose_constrained(&undo, &removed, at.draws(1))?;
+        while let Some(change) = trace.next_stage() {
+            change?;
+        }
         trace.commit();
         Ok(Outcome::one(false))
     }

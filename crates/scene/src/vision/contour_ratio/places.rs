@@ -35,8 +35,9 @@ impl Places {
     /// Finds the pieces from one on.
     #[inline(always)]
     pub fn set(&mut self, grid: &Edges, elements: &ContourSlice<'_>, first: usize) {
-        let lists = [elements.x, elements.y, elements.tx, elements.ty, elements.length];
-        let [x, y, tx, ty, length] = lists.map(|list| part(list, first));
+        let (x, y) = (part(elements.x, first), part(elements.y, first));
+        let (tx, ty) = (part(elements.tx, first), part(elements.ty, first));
+        let length = part(elements.length, first);
         let count = elements.len() - first;
         for i in 0..AT_A_TIME {
             let weight = elements.weight([x[i], y[i]], [tx[i], ty[i]], length[i]);
