@@ -30,11 +30,13 @@ impl Plan {
 /// The largest number of joint values that are summed out.
 const MOST_JOINT: usize = 24;
 
-/// Returns the names of the observations that have surrogates.
-fn with_surrogates(p: &Program) -> Vec<String> {
-    fn of(p: &Program, e: &Effect, into: &mut Vec<String>) {
+/// Returns the names of the observations that have surrogates, and whether these are flat.
+fn with_surrogates(p: &Program) -> Vec<(String, bool)> {
+    fn of(p: &Program, e: &Effect, into: &mut Vec<(String, bool)>) {
         match e {
-            Effect::Observe(name, _, _, Some(_)) => into.push(p.names[*name].clone()),
+            Effect::Observe(name, _, _, Some(coarse)) => {
+                into.push((p.names[*name].clone(), matches!(coarse, Dist::Flat)));
+            }
             Effect::Guarded(_, inner) => inner.iter().for_each(|e| of(p, e, into)),
             _ => {}
         }
@@ -109,13 +111,21 @@ pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream
     let coarse = with_surrogates(p);
     if !coarse.is_empty() {
         let (k, at) = (REVERSIBLE[rng.index(REVERSIBLE.len())], rng.index(coarse.len()));
-        let y = &coarse[at];
+        let y = &coarse[at].0;
         all.push(Plan::of("delayed", format!("delayed({k}, @{y});")));
-        if let Some(z) = coarse.get(at + 1) {
+        if let Some((z, _)) = coarse.get(at + 1) {
             all.push(Plan::of("delayed", format!("delayed({k}, @{y}, then = @{z});")));
         }
     }
-    if let Some(own) = own(p, posterior, rng) {
+    if let Some(mut own) = own(p, posterior, rng) {
+        // Other surrogates may not have all choices that it proposes.
+        let mut flat = coarse.iter().filter(|c| c.1).map(|c| &c.0);
+        if let Some(y) = flat.next().filter(|_| rng.uniform() < 0.5) {
+            own.statements = match flat.next() {
+                Some(z) => format!("delayed(moved(), @{y}, then = @{z});"),
+                None => format!("delayed(moved(), @{y});"),
+            };
+        }
         all.push(own);
     }
     if rng.uniform() < 0.5 {
@@ -133,7 +143,8 @@ pub fn plans(p: &Program, posterior: &Posterior, default: &str, rng: &mut Stream
 }
 
 /// Returns a plan with a kernel declared in the program: it proposes one or two top-level
-/// choices that always exist, depending on their present values.
+/// choices that always exist, depending on their present values, which it reads as values or
+/// by the names of the program.
 fn own(p: &Program, posterior: &Posterior, rng: &mut Stream) -> Option<Plan> {
     let mut proposals = Vec::new();
     for item in &p.items {
@@ -144,15 +155,16 @@ fn own(p: &Program, posterior: &Posterior, rng: &mut Stream) -> Option<Plan> {
         }
         let tenths = |from: usize, rng: &mut Stream| (from + rng.index(8)) as f64 / 10.0;
         let (a, b, c) = (tenths(1, rng), tenths(1, rng), tenths(4, rng));
+        let now = if rng.uniform() < 0.5 { format!("value({at})") } else { p.names[*n].clone() };
         proposals.push(match d {
             Dist::Flip(_) => format!("propose {at} ~ flip({a:?});"),
             Dist::Normal(..) => {
-                format!("propose {at} ~ normal({a:?} * value({at}) + {b:?}, {c:?});")
+                format!("propose {at} ~ normal({a:?} * {now} + {b:?}, {c:?});")
             }
             Dist::Categorical(values) => {
                 let others = format!(", {b:?}, {c:?}");
                 let others = if values.len() == 2 { &others[..others.len() / 2] } else { &others };
-                format!("propose {at} ~ categorical([{a:?} + value({at}){others}]);")
+                format!("propose {at} ~ categorical([{a:?} + {now}{others}]);")
             }
             _ => continue,
         });

@@ -284,8 +284,10 @@ impl Trace {
         Ok(())
     }
 
-    /// Commits the pending proposal, if there is one.
+    /// Commits the pending proposal, if there is one; after its last stage, since observations
+    /// that wait would be lost.
     pub fn commit(&mut self) {
+        debug_assert!(!self.observations_wait());
         if self.update.take().is_some() {
             self.keep_pending();
             self.graph.commit();
