@@ -61,7 +61,16 @@ fn joined([whole, upper, lower]: [i64; 3]) -> i128 {
 
 #[inline]
 fn quantised(x: f64) -> i128 {
-    joined(pieces(x))
+    // x is significand * 2^(shift - 64), so from 2^-11 on nothing is rounded.
+    let magnitude = x.to_bits() & (u64::MAX >> 1);
+    let shift = (magnitude >> 52).wrapping_sub(1023 - 12);
+    if !(1..=51).contains(&shift) {
+        return joined(pieces(x));
+    }
+    let significand = magnitude & ((1 << 52) - 1) | 1 << 52;
+    let whole = u128::from(significand >> (64 - shift)) << 64 | u128::from(significand << shift);
+    let sign = i128::from((x.to_bits() as i64) >> 63);
+    (whole as i128 ^ sign) - sign
 }
 
 /// How many pieces a machine word can sum: they are below 2^40.
@@ -328,6 +337,8 @@ mod tests {
             -LARGE.next_down(),
         ];
         xs.extend([2.5, -2.5, -1e-300, 5.4e-20, -5.4e-20, 0.1, -0.1, f64::from_bits(1)]);
+        let edge = libm::exp2(-11.0);
+        xs.extend([edge, -edge, edge.next_down(), -edge.next_down(), edge.next_up()]);
         xs.extend((0..2000).map(|i| libm::sin(f64::from(i)) * libm::exp2(f64::from(i % 120 - 80))));
         for x in xs {
             assert_eq!(quantised(x), (x * SCALE) as i128, "{x}");

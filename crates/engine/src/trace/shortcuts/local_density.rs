@@ -53,6 +53,10 @@ pub(crate) struct Evaluation<'a, const N: usize> {
     turned: bool,
     prior: ExactSum,
     likelihood: ExactSum,
+    /// Minus the scores that change: of the prior and the likelihood. They are the same for every
+    /// value, so only the first one adds them up.
+    removed: [ExactSum; 2],
+    is_first: bool,
 }
 
 impl Trace {
@@ -196,11 +200,17 @@ impl<'a> Evaluation<'a, REGISTERS> {
         power: f64,
     ) -> Option<f64> {
         self.begin(Register::of_datum(value)?);
-        self.prior.sub(self.graph[target].score);
+        if self.is_first {
+            self.removed[0].sub(self.graph[target].score);
+        }
         self.prior.add(dist.log_density_stored(value));
         local_densities
             .iter()
             .try_for_each(|placed| self.run(placed, local_densities.len() == 1))?;
+        if std::mem::take(&mut self.is_first) {
+            self.prior.merge(&self.removed[0]);
+            self.likelihood.merge(&self.removed[1]);
+        }
         Some(Weight::beside(&self.prior, &self.likelihood, power))
     }
 
@@ -209,8 +219,10 @@ impl<'a> Evaluation<'a, REGISTERS> {
         self.registers[0] = value;
         self.made.clear();
         self.turned = false;
-        self.prior = ExactSum::default();
-        self.likelihood = ExactSum::default();
+        [self.prior, self.likelihood] = match self.is_first {
+            true => Default::default(),
+            false => self.removed.clone(),
+        };
     }
 
     /// Runs a local density. With `may_choose`, selections may take their other
@@ -288,7 +300,9 @@ impl<'a> Evaluation<'a, REGISTERS> {
                         parameters,
                         Register::of(&self.node(slot).value),
                     )?;
-                    self.prior.sub(self.node(slot).score);
+                    if self.is_first {
+                        self.removed[0].sub(self.node(slot).score);
+                    }
                     self.prior.add(score);
                 }
                 Instruction::Observe { slot, builtin, ref parameters, value } => {
@@ -297,7 +311,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     let observed = replaced.map_or_else(|| self.read(value), Some)?;
                     match self.log_density(builtin, parameters, observed) {
                         Some(score) => {
-                            self.graph.take_score(n, &mut self.likelihood);
+                            self.remove_score(n);
                             self.likelihood.add(score);
                         }
                         None => {
@@ -311,7 +325,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
                 }
                 Instruction::Factor { slot, weight } => {
                     let weight = self.number(weight).filter(|w| !w.is_nan())?;
-                    self.likelihood.sub(self.node(slot).score);
+                    self.remove_score(self.base + slot);
                     self.likelihood.add(weight);
                 }
             }
@@ -379,12 +393,20 @@ impl<'a> Evaluation<'a, REGISTERS> {
             None => self.value(observed)?,
         };
         let score = self.graph.score_of_values(n, dist, &values, &observed).ok()?;
-        self.graph.take_score(n, &mut self.likelihood);
+        self.remove_score(n);
         match score {
             Score::One(score) => self.likelihood.add(score),
             Score::Sum(sum) => self.likelihood.merge(&sum),
         }
         Some(())
+    }
+
+    /// Removes the present score of an observation or factor.
+    #[inline(always)]
+    fn remove_score(&mut self, n: NodeId) {
+        if self.is_first {
+            self.graph.take_score(n, &mut self.removed[1]);
+        }
     }
 
     /// True if its selections can take their other alternatives without releasing
@@ -468,6 +490,8 @@ impl<'a, const N: usize> Evaluation<'a, N> {
             turned: false,
             prior: ExactSum::default(),
             likelihood: ExactSum::default(),
+            removed: Default::default(),
+            is_first: true,
         }
     }
 
