@@ -181,7 +181,7 @@ impl Store {
     }
 
     /// Returns the node in a slot of an enclosing frame, `up` levels out.
-    fn outer(&self, frame: FrameId, up: u16, slot: Slot) -> NodeId {
+    pub(super) fn outer(&self, frame: FrameId, up: u16, slot: Slot) -> NodeId {
         let mut f = frame;
         for _ in 0..up {
             f = self[f].parent;

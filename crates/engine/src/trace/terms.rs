@@ -225,12 +225,7 @@ impl Store {
 
     /// Returns the log density of a number, without making the distribution, if its parameters
     /// are numbers.
-    fn score_of_number(
-        &self,
-        spec: &DistSpec,
-        values: &[&Value],
-        observed: &Value,
-    ) -> Option<f64> {
+    fn score_of_number(&self, spec: &DistSpec, values: &[&Value], observed: &Value) -> Option<f64> {
         let (DistSpec::Family { builtin, .. }, Value::Num(x)) = (spec, observed) else {
             return None;
         };

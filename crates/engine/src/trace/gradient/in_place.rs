@@ -3,7 +3,7 @@
 //! invalidated, evaluated or journaled.
 
 use crate::lang::builtins::CovarianceValue;
-use crate::lang::code::{Code, Op, Operand};
+use crate::lang::code::{Op, Operand};
 use crate::lang::tape::{Form, ScoreSums, ScoreTerms, Scored, Tape};
 use crate::lang::value::Value;
 use crate::trace::Trace;
@@ -31,10 +31,11 @@ pub(in crate::trace) struct InPlace {
     /// Those of the values, and of the scores, that are one number on the tape. Apart from
     /// the others because there are thousands where choices are summed out of a loop.
     number_values: Numbers,
-    number_scores: Numbers,
-    /// Terms of the prior and of the likelihood that change.
-    old: [Vec<f64>; 2],
-    new: [Vec<f64>; 2],
+    /// Of the prior, and of the likelihood.
+    number_scores: [Numbers; 2],
+    /// Their terms that change.
+    old: Vec<f64>,
+    new: Vec<f64>,
     each: Vec<f64>,
     made: Vec<Value>,
     columns: FxHashMap<usize, Vec<f64>>,
@@ -60,11 +61,11 @@ impl Numbers {
     /// Takes those that `number` finds out of a list, unless they depend on several choices.
     fn taken_from<T>(
         list: &mut Vec<(Given, NodeId, T)>,
-        number: impl Fn(&T) -> Option<usize>,
+        number: impl Fn(NodeId, &T) -> Option<usize>,
     ) -> Numbers {
         let mut found = Vec::new();
         list.retain(|(given, n, place)| {
-            let at = number(place).and_then(|at| u32::try_from(at).ok());
+            let at = number(*n, place).and_then(|at| u32::try_from(at).ok());
             let given = match given[..] {
                 [] => Some((NONE, 0)),
                 [one] => Some(one),
@@ -147,20 +148,24 @@ impl InPlace {
     }
 
     /// Everything where the complete tape has it.
-    pub fn on(mut self, tape: &Tape) -> InPlace {
+    pub fn on(mut self, tape: &Tape, graph: &Store) -> InPlace {
         self.values.iter_mut().for_each(|(_, _, form)| *form = tape.place_of(form));
         self.scores.iter_mut().for_each(|(_, _, at)| *at = tape.place_of_score(at));
         self.besides.iter_mut().for_each(|(_, _, besides)| match besides {
             Besides::Evaluation(call) => *call = tape.place_of_score(call),
             Besides::Noise(form) => *form = tape.place_of(form),
         });
-        self.number_values = Numbers::taken_from(&mut self.values, |form| match form {
+        self.number_values = Numbers::taken_from(&mut self.values, |_, form| match form {
             Form::Num(at) => Some(*at),
             _ => None,
         });
-        self.number_scores = Numbers::taken_from(&mut self.scores, |scored| match scored {
-            Scored::Numbers(run, false) => Some(run.start),
-            _ => None,
+        self.number_scores = [true, false].map(|of_choices| {
+            Numbers::taken_from(&mut self.scores, |n, scored| match scored {
+                Scored::Numbers(run, false) => {
+                    (matches!(graph.op(n), Op::Draw { .. }) == of_choices).then_some(run.start)
+                }
+                _ => None,
+            })
         });
         self
     }
@@ -181,7 +186,7 @@ impl InPlace {
             let side = node.side.as_deref();
             side.is_none() || node.state != State::Clean || takes_one(graph.op(*n), side)
         };
-        self.number_scores.at(values).all(|same| same.iter().all(one))
+        self.number_scores.iter().all(|s| s.at(values).all(|same| same.iter().all(one)))
             && self.scores.iter().filter(|(given, n, _)| holds(graph, given, *n, values)).all(
                 |(_, n, scored)| {
                     let terms = tape.terms(scored, &mut self.each, &mut self.columns);
@@ -203,7 +208,6 @@ impl InPlace {
     pub fn apply(
         &mut self,
         graph: &mut Graph,
-        code: &Code,
         tape: &Tape,
         values: &[usize],
         before: Option<&ScoreSums>,
@@ -285,7 +289,7 @@ impl InPlace {
             }
         }
         drop(made);
-        self.put_number_scores((graph, code, tape), values, [&mut old, &mut new]);
+        self.put_number_scores(graph, tape.all_numbers(), values, [&mut old, &mut new]);
         let (new, old) = match before {
             Some(before) => (tape.sums(), before),
             None => (&new, &old),
@@ -298,38 +302,37 @@ impl InPlace {
     /// present ones, where they differ, to the sums.
     fn put_number_scores(
         &mut self,
-        (graph, code, tape): (&mut Graph, &Code, &Tape),
+        graph: &mut Graph,
+        numbers: &[f64],
         values: &[usize],
-        [old, new]: [&mut ScoreSums; 2],
+        [before, after]: [&mut ScoreSums; 2],
     ) {
-        self.old.iter_mut().chain(&mut self.new).for_each(Vec::clear);
-        let (nodes, numbers) = (graph.store.nodes_mut(), tape.all_numbers());
-        for same in self.number_scores.at(values) {
-            for (n, at) in same {
-                let node = &mut nodes[*n];
-                if node.state != State::Clean {
-                    continue;
-                }
-                let score = numbers[*at as usize];
-                match node.side.as_deref_mut() {
-                    Some(Side::Total(t)) => {
+        let nodes = graph.store.nodes_mut();
+        let most = self.number_scores.iter().map(|s| s.all.len()).max().unwrap_or(0);
+        self.old.resize(most, 0.0);
+        self.new.resize(most, 0.0);
+        for (scores, observed) in self.number_scores.iter().zip([false, true]) {
+            let (old, new) = (&mut self.old[..], &mut self.new[..]);
+            let mut changed = 0;
+            for same in scores.at(values) {
+                for (n, at) in same {
+                    let (node, score) = (&mut nodes[*n], numbers[*at as usize]);
+                    if node.state != State::Clean {
+                        continue;
+                    }
+                    if let Some(Side::Total(t)) = node.side.as_deref_mut() {
                         if node.score == 0.0 {
-                            old.likelihood.merge(&t.sum);
+                            before.likelihood.merge(&t.sum);
                         }
                         t.sum = ExactSum::default();
                     }
-                    _ if node.score.to_bits() == score.to_bits() => continue,
-                    _ => {}
+                    (old[changed], new[changed]) = (node.score, score);
+                    node.score = score;
+                    changed += 1;
                 }
-                let likelihood = usize::from(!matches!(code.ops[node.op], Op::Draw { .. }));
-                self.old[likelihood].push(node.score);
-                self.new[likelihood].push(score);
-                node.score = score;
             }
-        }
-        for (sums, terms) in [(old, &self.old), (new, &self.new)] {
-            sums.prior.add_all(&terms[0]);
-            sums.likelihood.add_all(&terms[1]);
+            before.of(observed).add_all(&old[..changed]);
+            after.of(observed).add_all(&new[..changed]);
         }
     }
 }
