@@ -181,12 +181,14 @@ impl InPlace {
                 self.made.push(value);
             }
         }
+        let is_plain = |(n, _): &(NodeId, u32)| graph.store[*n].side.is_none();
         let one = |(n, _): &(NodeId, u32)| {
             let node = &graph.store[*n];
-            let side = node.side.as_deref();
-            side.is_none() || node.state != State::Clean || takes_one(graph.op(*n), side)
+            node.state != State::Clean || takes_one(graph.op(*n), node.side.as_deref())
         };
-        self.number_scores.iter().all(|s| s.at(values).all(|same| same.iter().all(one)))
+        self.number_scores
+            .iter()
+            .all(|s| s.all.iter().all(is_plain) || s.at(values).all(|same| same.iter().all(one)))
             && self.scores.iter().filter(|(given, n, _)| holds(graph, given, *n, values)).all(
                 |(_, n, scored)| {
                     let terms = tape.terms(scored, &mut self.each, &mut self.columns);

@@ -42,11 +42,11 @@ const READERS: usize = 4;
 const LARGEST: usize = 1024;
 
 /// The evaluation of a local density on the nodes of one frame.
-pub(crate) struct Evaluation<'a, const N: usize> {
+pub(crate) struct Evaluation<'a> {
     graph: &'a Store,
     code: &'a Code,
     base: NodeId,
-    registers: [Register<'a>; N],
+    registers: [Register<'a>; REGISTERS],
     /// The values that are neither numbers nor part of the trace.
     made: SmallVec<[Value; 4]>,
     /// True if a selection takes its other alternative.
@@ -154,8 +154,19 @@ impl Graph {
     }
 
     /// Returns an evaluation of local densities, for [`Evaluation::weigh`].
-    pub fn evaluation<'a>(&'a self, code: &'a Code) -> Evaluation<'a, REGISTERS> {
-        Evaluation::new(self, code, [Register::Num(0.0); REGISTERS])
+    pub fn evaluation<'a>(&'a self, code: &'a Code) -> Evaluation<'a> {
+        Evaluation {
+            graph: &self.store,
+            code,
+            base: NodeId::default(),
+            registers: [Register::Num(0.0); REGISTERS],
+            made: SmallVec::new(),
+            turned: false,
+            prior: ExactSum::default(),
+            likelihood: ExactSum::default(),
+            removed: Default::default(),
+            is_first: true,
+        }
     }
 }
 
@@ -178,17 +189,18 @@ impl Store {
             return None;
         };
         let mut read = [Register::Num(0.0); PARAMETERS];
-        let read = read.get_mut(..args.len())?;
-        let mut e = Evaluation::new(self, &self.code, []);
-        e.base = n - self.slot_facts(n).slot;
+        let (read, frame) = (read.get_mut(..args.len())?, self[n].frame);
         for (to, o) in read.iter_mut().zip(args) {
-            *to = e.read(Input::Operand(*o))?;
+            if self.unready(frame, *o).is_some() {
+                return None;
+            }
+            *to = Register::of(self.value(frame, *o));
         }
         family(self.code.builtins.get(*builtin), read)
     }
 }
 
-impl<'a> Evaluation<'a, REGISTERS> {
+impl<'a> Evaluation<'a> {
     /// Returns the log weight of a value of the choice relative to the current one, with
     /// the likelihood raised to a power; `None` if the local densities do not cover it.
     pub fn weigh(
@@ -475,23 +487,6 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     _ => None,
                 }
             }
-        }
-    }
-}
-
-impl<'a, const N: usize> Evaluation<'a, N> {
-    fn new(graph: &'a Store, code: &'a Code, registers: [Register<'a>; N]) -> Self {
-        Evaluation {
-            graph,
-            code,
-            base: NodeId::default(),
-            registers,
-            made: SmallVec::new(),
-            turned: false,
-            prior: ExactSum::default(),
-            likelihood: ExactSum::default(),
-            removed: Default::default(),
-            is_first: true,
         }
     }
 
