@@ -231,10 +231,10 @@ impl<'a> Evaluation<'a> {
         self.registers[0] = value;
         self.made.clear();
         self.turned = false;
-        [self.prior, self.likelihood] = match self.is_first {
-            true => Default::default(),
-            false => self.removed.clone(),
-        };
+        if self.is_first {
+            self.removed = Default::default();
+        }
+        [self.prior, self.likelihood] = self.removed.clone();
     }
 
     /// Runs a local density. With `may_choose`, selections may take their other

@@ -315,7 +315,9 @@ impl Graph {
                     State::Clean => changed |= dep.changed == epoch,
                     // After those before it.
                     State::Running if self.update.stack.len() > height => break,
-                    _ => drop(self.need(d)?),
+                    _ => {
+                        self.need(d)?;
+                    }
                 }
             }
             // All that it reads in any case waits on the stack, the first on top.
