@@ -63,9 +63,9 @@ fn position(base: &Value, x: f64) -> Result<Value, Fault> {
 
 /// Returns `x` as an index into `len` elements, if it is one.
 pub(crate) fn place(len: usize, x: f64) -> Option<usize> {
-    // The conversion saturates, and gives 0 for NaN; the comparison then fails.
-    let i = x as usize;
-    (i < len && i as f64 == x).then_some(i)
+    // The conversion saturates, and gives 0 for NaN; a comparison then fails.
+    let i = x as i64;
+    ((i as usize) < len && i as f64 == x).then_some(i as usize)
 }
 
 /// Returns the components `[x, y, z]` as a record with these names.

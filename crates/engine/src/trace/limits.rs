@@ -179,16 +179,18 @@ impl Budget {
     pub fn count_operation(&mut self, store: &Store, n: NodeId) -> Result<(), Failure> {
         self.operations += 1;
         self.since_look += 1;
+        let looks = self.operations > self.limits.operations || self.since_look >= BETWEEN_LOOKS;
+        if looks { self.look(store, n) } else { Ok(()) }
+    }
+
+    /// Fails if there were too many operations, or if it is too late.
+    #[cold]
+    fn look(&mut self, store: &Store, n: NodeId) -> Result<(), Failure> {
         if self.operations > self.limits.operations {
             let message =
                 format!("one evaluation took more than {} operations", self.limits.operations);
             return Err(store.fail(n, FaultKind::Limit, message, Some(raise("operations"))));
         }
-        if self.since_look >= BETWEEN_LOOKS { self.look_at_clock(store, n) } else { Ok(()) }
-    }
-
-    #[cold]
-    fn look_at_clock(&mut self, store: &Store, n: NodeId) -> Result<(), Failure> {
         self.since_look = 0;
         if !self.limits.stop.is_asked() {
             self.late = None;

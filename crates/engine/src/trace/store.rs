@@ -94,6 +94,11 @@ impl Store {
         self.nodes.iter().enumerate().map(|(i, node)| (NodeId::new(i), node))
     }
 
+    /// Returns the nodes, by id.
+    pub fn nodes_mut(&mut self) -> &mut [Node] {
+        &mut self.nodes
+    }
+
     /// Iterates over the nodes that are up to date.
     pub fn clean(&self) -> impl Iterator<Item = NodeId> {
         self.nodes().filter(|(_, node)| node.state == State::Clean).map(|(n, _)| n)
@@ -176,7 +181,7 @@ impl Store {
     }
 
     /// Returns the node in a slot of an enclosing frame, `up` levels out.
-    fn outer(&self, frame: FrameId, up: u16, slot: Slot) -> NodeId {
+    pub(super) fn outer(&self, frame: FrameId, up: u16, slot: Slot) -> NodeId {
         let mut f = frame;
         for _ in 0..up {
             f = self[f].parent;
@@ -210,29 +215,31 @@ impl Store {
     ) -> Result<SmallVec<[&'a Value; 4]>, NodeId> {
         let mut values = SmallVec::new();
         for o in operands {
-            let value = match self.resolve(frame, *o) {
-                None => self.value(frame, *o),
-                Some(m) => {
-                    let node = &self[m];
-                    if node.state != State::Clean {
-                        return Err(m);
-                    }
-                    &node.value
-                }
-            };
-            values.push(match value {
-                Value::Container(r) => {
-                    let gather = &self[r.node.gather()];
-                    if gather.state != State::Clean {
-                        return Err(r.node.gather());
-                    }
-                    deps.push(r.node.gather());
-                    &gather.value
-                }
-                v => v,
-            });
+            values.push(self.input(frame, *o, deps)?);
         }
         Ok(values)
+    }
+
+    /// Returns the value of one operand, as [`Store::inputs`] does.
+    #[inline]
+    pub(crate) fn input(
+        &self,
+        frame: FrameId,
+        o: Operand,
+        deps: &mut Deps,
+    ) -> Result<&Value, NodeId> {
+        let clean = |m: NodeId| match &self[m] {
+            node if node.state == State::Clean => Ok(&node.value),
+            _ => Err(m),
+        };
+        let value = match o {
+            Operand::Const(i) => return Ok(self.code.const_value(i)),
+            Operand::Local(slot) => clean(self[frame].base + slot)?,
+            Operand::Outer { up, slot } => clean(self.outer(frame, up, slot))?,
+        };
+        let Value::Container(r) = value else { return Ok(value) };
+        deps.push(r.node.gather());
+        clean(r.node.gather())
     }
 
     /// Returns the value of an operand, with a container read as an array or record;

@@ -4,13 +4,16 @@
 use super::choices::Target;
 use super::node::*;
 use super::select::{Facts, Selector};
+use super::shortcuts::register::Register;
 use super::store::Store;
 use super::update::Failure;
 use crate::lang::address::Address;
+use crate::lang::builtins::Scalar;
 use crate::lang::code::{DistSpec, Op, Operand};
 use crate::lang::density::{self, Score, is_repeated, likelihood_score};
 use crate::lang::error::Fault;
 use crate::lang::key::Key;
+use crate::lang::local_density::PARAMETERS;
 use crate::lang::value::Value;
 use pcadlang_numerics::dist::{Datum, Dist, Support};
 use pcadlang_numerics::num::ExactSum;
@@ -183,7 +186,7 @@ impl Store {
         let values = self.inputs(self[n].frame, spec.operands(), deps)?;
         let observed = match self.replaced(n) {
             Some(v) => v,
-            None => self.inputs(self[n].frame, &[value], deps)?[0],
+            None => self.input(self[n].frame, value, deps)?,
         };
         Ok(self.score_of_values(n, spec, &values, observed))
     }
@@ -213,8 +216,29 @@ impl Store {
                 }
             }
         }
+        if let Some(score) = self.score_of_number(spec, values, observed) {
+            return Ok(Score::One(score));
+        }
         let dist = self.dist_of_values(n, spec, values)?;
         density::score(&dist, observed).map_err(|f| self.fault(n, f))
+    }
+
+    /// Returns the log density of a number, without making the distribution, if its parameters
+    /// are numbers.
+    fn score_of_number(&self, spec: &DistSpec, values: &[&Value], observed: &Value) -> Option<f64> {
+        let (DistSpec::Family { builtin, .. }, Value::Num(x)) = (spec, observed) else {
+            return None;
+        };
+        let builtin = self.code.builtins.get(*builtin);
+        let Some(Scalar::Family(family)) = builtin.scalar.filter(|_| !x.is_nan()) else {
+            return None;
+        };
+        let mut space = [0.0; PARAMETERS];
+        let numbers = space.get_mut(..values.len())?;
+        for ((to, from), arg) in numbers.iter_mut().zip(values).zip(&*builtin.args) {
+            *to = Register::of(from).number_or_default(arg)?;
+        }
+        (family.log_density)(numbers, *x)
     }
 
     /// Adds an observation's or factor's score to a sum.

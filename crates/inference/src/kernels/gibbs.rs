@@ -11,7 +11,7 @@ use crate::kernel::{
     Kernel, Outcome, Registered, SiteSelection, StepContext, accepts, recoverable,
 };
 use pcadlang_engine::trace::{Change, Target, Trace, TraceResult};
-use pcadlang_numerics::dist::{Datum, Dist};
+use pcadlang_numerics::dist::{Datum, Dist, Support};
 use pcadlang_numerics::num::log_sum_exp;
 use pcadlang_numerics::rng::Stream;
 
@@ -36,6 +36,8 @@ pub struct Gibbs {
     /// The values of the choice, their log weights, and the weights relative to the
     /// largest; kept between steps to avoid allocations.
     values: Vec<Datum>,
+    /// The support that has these values.
+    listed: Option<Support>,
     log: Vec<f64>,
     weights: Vec<f64>,
     /// True once a value was met that changes the set of choices: each is then proposed from
@@ -57,8 +59,16 @@ impl Gibbs {
     /// A kernel for one of these choices at a time.
     pub fn new(scope: SiteSelection) -> Self {
         let scope = Registered::new(scope.single());
-        let (values, log, weights) = Default::default();
-        Gibbs { scope, values, log, weights, apart: false }
+        let (values, listed, log, weights) = Default::default();
+        Gibbs { scope, values, listed, log, weights, apart: false }
+    }
+
+    /// Lists the values of a support; false if they are infinitely many.
+    fn list(&mut self, support: Support) -> bool {
+        if self.listed.as_ref() != Some(&support) {
+            self.listed = support.list_values(&mut self.values).then_some(support);
+        }
+        self.listed.is_some()
     }
 
     /// Computes the log weights of all values, relative to the state with value `old`,
@@ -171,8 +181,7 @@ impl Kernel for Gibbs {
             return Ok(Outcome::default());
         };
         let stored = trace.stored(target);
-        let Some(dist) = trace.dist(target).filter(|d| d.support().list_values(&mut self.values))
-        else {
+        let Some(dist) = trace.dist(target).filter(|d| self.list(d.support())) else {
             return Ok(Outcome::default());
         };
         let Some(old) = self.values.iter().position(|v| Some(v) == stored.as_ref()) else {
@@ -297,7 +306,7 @@ mod tests {
             let selection = trace.select(&selector);
             let t = trace.targets(selection)[0];
             let mut kernel = Gibbs::new(SiteSelection { selector, pick: Pick::One });
-            assert!(trace.dist(t).unwrap().support().list_values(&mut kernel.values));
+            assert!(kernel.list(trace.dist(t).unwrap().support()));
             let mut moved = 0;
             for step in 0..40 {
                 let at = StepContext::new(1, 0, step);

@@ -59,9 +59,19 @@ fn joined([whole, upper, lower]: [i64; 3]) -> i128 {
     (i128::from(whole) << 64) + (i128::from(upper) << 32) + i128::from(lower)
 }
 
+/// Returns x 2^64 if |x| is at least 2^-11, so that nothing is rounded, and below 2^40.
 #[inline]
-fn quantised(x: f64) -> i128 {
-    joined(pieces(x))
+fn shifted(x: f64) -> Option<i128> {
+    // x is significand * 2^(shift - 64).
+    let magnitude = x.to_bits() & (u64::MAX >> 1);
+    let shift = (magnitude >> 52).wrapping_sub(1023 - 12);
+    if !(1..=51).contains(&shift) {
+        return None;
+    }
+    let significand = magnitude & ((1 << 52) - 1) | 1 << 52;
+    let whole = u128::from(significand >> (64 - shift)) << 64 | u128::from(significand << shift);
+    let sign = i128::from((x.to_bits() as i64) >> 63);
+    Some((whole as i128 ^ sign) - sign)
 }
 
 /// How many pieces a machine word can sum: they are below 2^40.
@@ -73,7 +83,10 @@ impl ExactSum {
     /// Adds a term.
     #[inline]
     pub fn add(&mut self, x: f64) {
-        if x.abs() < LARGE { self.fine += quantised(x) } else { self.put(x, 1) }
+        match shifted(x) {
+            Some(whole) => self.fine += whole,
+            None => self.put(x, 1),
+        }
     }
 
     /// Adds terms, with the same result as one by one.
@@ -120,7 +133,10 @@ impl ExactSum {
     /// Removes a term: the exact inverse of [`ExactSum::add`].
     #[inline]
     pub fn sub(&mut self, x: f64) {
-        if x.abs() < LARGE { self.fine -= quantised(x) } else { self.put(x, -1) }
+        match shifted(x) {
+            Some(whole) => self.fine -= whole,
+            None => self.put(x, -1),
+        }
     }
 
     /// Returns whether all terms were finite and small.
@@ -166,7 +182,9 @@ impl ExactSum {
     }
 
     fn put(&mut self, x: f64, sign: i64) {
-        if x.is_nan() {
+        if x.abs() < LARGE {
+            self.fine += i128::from(sign) * joined(pieces(x));
+        } else if x.is_nan() {
             self.nan += sign;
         } else if x == f64::INFINITY {
             self.positive += sign;
@@ -328,9 +346,12 @@ mod tests {
             -LARGE.next_down(),
         ];
         xs.extend([2.5, -2.5, -1e-300, 5.4e-20, -5.4e-20, 0.1, -0.1, f64::from_bits(1)]);
+        let edge = libm::exp2(-11.0);
+        xs.extend([edge, -edge, edge.next_down(), -edge.next_down(), edge.next_up()]);
         xs.extend((0..2000).map(|i| libm::sin(f64::from(i)) * libm::exp2(f64::from(i % 120 - 80))));
         for x in xs {
-            assert_eq!(quantised(x), (x * SCALE) as i128, "{x}");
+            assert_eq!(joined(pieces(x)), (x * SCALE) as i128, "{x}");
+            assert_eq!(sum(&[x]).fine, (x * SCALE) as i128, "{x}");
         }
     }
 

@@ -231,10 +231,9 @@ impl Tape {
         form.value(&self.values)
     }
 
-    /// Returns a number of the buffer at the last run.
-    #[inline]
-    pub fn number(&self, at: usize) -> f64 {
-        self.values.numbers[at]
+    /// Returns the numbers of the buffer at the last run.
+    pub fn all_numbers(&self) -> &[f64] {
+        &self.values.numbers
     }
 
     /// Returns the numbers of a form in the buffer at the last run; `None` for others.

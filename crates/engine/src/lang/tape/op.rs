@@ -322,7 +322,8 @@ impl ScoreSums {
         }
     }
 
-    fn of(&mut self, observed: bool) -> &mut ExactSum {
+    /// The sum of the observations' scores, or of the choices'.
+    pub fn of(&mut self, observed: bool) -> &mut ExactSum {
         if observed { &mut self.likelihood } else { &mut self.prior }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::op::Op;
 use pcadlang_numerics::rng::Stream;
+use smallvec::SmallVec;
 
 /// A choice that is summed out.
 #[derive(Clone, Debug)]
@@ -11,7 +12,7 @@ pub(super) struct Summed {
     pub given: Vec<(usize, usize)>,
     /// By joint value of those, the result of the sum; after the tape is complete, the
     /// operation and the place in it.
-    pub sums: Vec<(usize, usize)>,
+    pub sums: SmallVec<[(usize, usize); 1]>,
 }
 
 /// Resolves the results of sums to the operations that compute them.

@@ -304,6 +304,15 @@ impl Graph {
             return Ok(step);
         }
         let mut deps = Deps::new();
+        if let ([key], false) = (keys, matches!(self.value(frame, base), Value::Container(_))) {
+            let found = match self.input(frame, *key, &mut deps) {
+                Ok(key) => index_value(self.value(frame, base), key),
+                Err(m) => return self.need(m),
+            };
+            let value = found.map_err(|f| self.fault(n, f))?;
+            self.set_deps(n, deps);
+            return Ok(self.finish(n, value));
+        }
         let mut rest: SmallVec<[Value; 2]> = SmallVec::new();
         let read = self.inputs(frame, keys, &mut deps);
         if let Err(m) = read.map(|values| values.iter().for_each(|v| rest.push(Value::clone(v)))) {

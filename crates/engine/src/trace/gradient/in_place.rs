@@ -3,7 +3,7 @@
 //! invalidated, evaluated or journaled.
 
 use crate::lang::builtins::CovarianceValue;
-use crate::lang::code::{Code, Op, Operand};
+use crate::lang::code::{Op, Operand};
 use crate::lang::tape::{Form, ScoreSums, ScoreTerms, Scored, Tape};
 use crate::lang::value::Value;
 use crate::trace::Trace;
@@ -30,41 +30,71 @@ pub(in crate::trace) struct InPlace {
     scores: Vec<(Given, NodeId, Scored)>,
     /// Those of the values, and of the scores, that are one number on the tape. Apart from
     /// the others because there are thousands where choices are summed out of a loop.
-    number_values: Vec<OneNumber>,
-    number_scores: Vec<OneNumber>,
-    /// Terms of the prior and of the likelihood that change.
-    old: [Vec<f64>; 2],
-    new: [Vec<f64>; 2],
+    number_values: Numbers,
+    /// Of the prior, and of the likelihood.
+    number_scores: [Numbers; 2],
+    /// Their terms that change.
+    old: Vec<f64>,
+    new: Vec<f64>,
     each: Vec<f64>,
     made: Vec<Value>,
     columns: FxHashMap<usize, Vec<f64>>,
 }
 
-/// A node and the index of a number, for one value of a choice that is summed out ([`NONE`]
-/// if it depends on none).
-#[derive(Clone, Copy, Debug)]
-struct OneNumber {
-    choice: u32,
-    value: u32,
-    node: NodeId,
-    at: u32,
+/// Nodes and the indices of their numbers, in runs of those that exist at the same value of one
+/// choice that is summed out, or always ([`NONE`]).
+#[derive(Debug, Default)]
+struct Numbers {
+    all: Vec<(NodeId, u32)>,
+    runs: Vec<Run>,
 }
 
-impl OneNumber {
-    /// `None` if it depends on several choices.
-    fn new(given: &Given, node: NodeId, at: usize) -> Option<OneNumber> {
-        let at = u32::try_from(at).ok()?;
-        match given[..] {
-            [] => Some(OneNumber { choice: NONE, value: 0, node, at }),
-            [(choice, value)] => Some(OneNumber { choice, value, node, at }),
-            _ => None,
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    choice: u32,
+    value: u32,
+    /// Where it ends in the list.
+    end: u32,
+}
+
+impl Numbers {
+    /// Takes those that `number` finds out of a list, unless they depend on several choices.
+    fn taken_from<T>(
+        list: &mut Vec<(Given, NodeId, T)>,
+        number: impl Fn(NodeId, &T) -> Option<usize>,
+    ) -> Numbers {
+        let mut found = Vec::new();
+        list.retain(|(given, n, place)| {
+            let at = number(*n, place).and_then(|at| u32::try_from(at).ok());
+            let given = match given[..] {
+                [] => Some((NONE, 0)),
+                [one] => Some(one),
+                _ => None,
+            };
+            let one = given.zip(at).map(|(given, at)| (given, (*n, at)));
+            found.extend(one);
+            one.is_none()
+        });
+        found.sort_by_key(|(given, _)| *given);
+        let mut numbers = Numbers::default();
+        for same in found.chunk_by(|a, b| a.0 == b.0) {
+            let (choice, value) = same[0].0;
+            numbers.all.extend(same.iter().map(|(_, one)| *one));
+            numbers.runs.push(Run { choice, value, end: numbers.all.len() as u32 });
         }
+        numbers
     }
 
-    /// True if the choice has this value.
-    #[inline]
-    fn applies(&self, values: &[usize]) -> bool {
-        self.choice == NONE || values.get(self.choice as usize) == Some(&(self.value as usize))
+    /// The parts of the list with nodes that exist when the choices have these values.
+    fn at<'a>(&'a self, values: &'a [usize]) -> impl Iterator<Item = &'a [(NodeId, u32)]> {
+        let mut begin = 0;
+        self.runs.iter().filter_map(move |run| {
+            let all = begin..run.end as usize;
+            begin = all.end;
+            let applies = run.choice == NONE
+                || values.get(run.choice as usize) == Some(&(run.value as usize));
+            applies.then(|| &self.all[all])
+        })
     }
 }
 
@@ -118,26 +148,24 @@ impl InPlace {
     }
 
     /// Everything where the complete tape has it.
-    pub fn on(mut self, tape: &Tape) -> InPlace {
+    pub fn on(mut self, tape: &Tape, graph: &Store) -> InPlace {
         self.values.iter_mut().for_each(|(_, _, form)| *form = tape.place_of(form));
         self.scores.iter_mut().for_each(|(_, _, at)| *at = tape.place_of_score(at));
         self.besides.iter_mut().for_each(|(_, _, besides)| match besides {
             Besides::Evaluation(call) => *call = tape.place_of_score(call),
             Besides::Noise(form) => *form = tape.place_of(form),
         });
-        let numbers = &mut self.number_values;
-        self.values.retain(|(given, n, form)| {
-            let Form::Num(at) = form else { return true };
-            let one = OneNumber::new(given, *n, *at);
-            numbers.extend(one);
-            one.is_none()
+        self.number_values = Numbers::taken_from(&mut self.values, |_, form| match form {
+            Form::Num(at) => Some(*at),
+            _ => None,
         });
-        let numbers = &mut self.number_scores;
-        self.scores.retain(|(given, n, scored)| {
-            let Scored::Numbers(run, false) = scored else { return true };
-            let one = OneNumber::new(given, *n, run.start);
-            numbers.extend(one);
-            one.is_none()
+        self.number_scores = [true, false].map(|of_choices| {
+            Numbers::taken_from(&mut self.scores, |n, scored| match scored {
+                Scored::Numbers(run, false) => {
+                    (matches!(graph.op(n), Op::Draw { .. }) == of_choices).then_some(run.start)
+                }
+                _ => None,
+            })
         });
         self
     }
@@ -153,13 +181,14 @@ impl InPlace {
                 self.made.push(value);
             }
         }
-        let one = |s: &OneNumber| {
-            let node = &graph.store[s.node];
-            !s.applies(values)
-                || node.state != State::Clean
-                || takes_one(graph.op(s.node), node.side.as_deref())
+        let is_plain = |(n, _): &(NodeId, u32)| graph.store[*n].side.is_none();
+        let one = |(n, _): &(NodeId, u32)| {
+            let node = &graph.store[*n];
+            node.state != State::Clean || takes_one(graph.op(*n), node.side.as_deref())
         };
-        self.number_scores.iter().all(one)
+        self.number_scores
+            .iter()
+            .all(|s| s.all.iter().all(is_plain) || s.at(values).all(|same| same.iter().all(one)))
             && self.scores.iter().filter(|(given, n, _)| holds(graph, given, *n, values)).all(
                 |(_, n, scored)| {
                     let terms = tape.terms(scored, &mut self.each, &mut self.columns);
@@ -181,15 +210,18 @@ impl InPlace {
     pub fn apply(
         &mut self,
         graph: &mut Graph,
-        code: &Code,
         tape: &Tape,
         values: &[usize],
         before: Option<&ScoreSums>,
     ) {
-        for v in &self.number_values {
-            let node = &mut graph.store[v.node];
-            if v.applies(values) && node.state == State::Clean {
-                let now = tape.number(v.at as usize);
+        let (nodes, numbers) = (graph.store.nodes_mut(), tape.all_numbers());
+        for same in self.number_values.at(values) {
+            for (n, at) in same {
+                let node = &mut nodes[*n];
+                if node.state != State::Clean {
+                    continue;
+                }
+                let now = numbers[*at as usize];
                 match &mut node.value {
                     Value::Num(x) => *x = now,
                     other => *other = Value::Num(now),
@@ -259,7 +291,7 @@ impl InPlace {
             }
         }
         drop(made);
-        self.put_number_scores((graph, code, tape), values, [&mut old, &mut new]);
+        self.put_number_scores(graph, tape.all_numbers(), values, [&mut old, &mut new]);
         let (new, old) = match before {
             Some(before) => (tape.sums(), before),
             None => (&new, &old),
@@ -272,35 +304,37 @@ impl InPlace {
     /// present ones, where they differ, to the sums.
     fn put_number_scores(
         &mut self,
-        (graph, code, tape): (&mut Graph, &Code, &Tape),
+        graph: &mut Graph,
+        numbers: &[f64],
         values: &[usize],
-        [old, new]: [&mut ScoreSums; 2],
+        [before, after]: [&mut ScoreSums; 2],
     ) {
-        self.old.iter_mut().chain(&mut self.new).for_each(Vec::clear);
-        for s in &self.number_scores {
-            let node = &mut graph.store[s.node];
-            if !s.applies(values) || node.state != State::Clean {
-                continue;
-            }
-            let score = tape.number(s.at as usize);
-            let likelihood = usize::from(!matches!(code.ops[node.op], Op::Draw { .. }));
-            match node.side.as_deref_mut() {
-                Some(Side::Total(t)) => {
-                    if node.score == 0.0 {
-                        old.likelihood.merge(&t.sum);
+        let nodes = graph.store.nodes_mut();
+        let most = self.number_scores.iter().map(|s| s.all.len()).max().unwrap_or(0);
+        self.old.resize(most, 0.0);
+        self.new.resize(most, 0.0);
+        for (scores, observed) in self.number_scores.iter().zip([false, true]) {
+            let (old, new) = (&mut self.old[..], &mut self.new[..]);
+            let mut changed = 0;
+            for same in scores.at(values) {
+                for (n, at) in same {
+                    let (node, score) = (&mut nodes[*n], numbers[*at as usize]);
+                    if node.state != State::Clean {
+                        continue;
                     }
-                    t.sum = ExactSum::default();
+                    if let Some(Side::Total(t)) = node.side.as_deref_mut() {
+                        if node.score == 0.0 {
+                            before.likelihood.merge(&t.sum);
+                        }
+                        t.sum = ExactSum::default();
+                    }
+                    (old[changed], new[changed]) = (node.score, score);
+                    node.score = score;
+                    changed += 1;
                 }
-                _ if node.score.to_bits() == score.to_bits() => continue,
-                _ => {}
             }
-            self.old[likelihood].push(node.score);
-            self.new[likelihood].push(score);
-            node.score = score;
-        }
-        for (sums, terms) in [(old, &self.old), (new, &self.new)] {
-            sums.prior.add_all(&terms[0]);
-            sums.likelihood.add_all(&terms[1]);
+            before.of(observed).add_all(&old[..changed]);
+            after.of(observed).add_all(&new[..changed]);
         }
     }
 }

@@ -56,7 +56,7 @@ impl Trace {
         r.put_scores(&Given::new());
         r.put_values(|_| Some(Given::new()));
         let tape = r.recorded.tape.finish();
-        let in_place = r.recorded.in_place.map(|in_place| in_place.on(&tape));
+        let in_place = r.recorded.in_place.map(|in_place| in_place.on(&tape, &self.graph));
         Some((tape, in_place))
     }
 

@@ -195,7 +195,7 @@ impl Recording {
         let moved =
             self.tape.run_at_images(y, here) && in_place.fits(&trace.graph, &self.tape, &[]);
         if moved {
-            in_place.apply(&mut trace.graph, &trace.code, &self.tape, &[], Some(&self.start));
+            in_place.apply(&mut trace.graph, &self.tape, &[], Some(&self.start));
             trace.keep_moved(&self.targets, self.tape.coarse(here));
             self.start.clone_from(self.tape.sums());
             self.revision = trace.graph.revision;
@@ -241,7 +241,7 @@ impl Recording {
                 return false;
             }
             trace.commit();
-            in_place.apply(&mut trace.graph, &trace.code, &self.tape, &drawn, None);
+            in_place.apply(&mut trace.graph, &self.tape, &drawn, None);
             trace.keep_moved(&self.targets, self.tape.coarse(here));
             self.start.clone_from(self.tape.sums());
         }

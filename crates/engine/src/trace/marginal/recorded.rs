@@ -53,7 +53,7 @@ impl Trace {
         let Some((recorded, entries, sweep)) = tape else { return Ok(None) };
         let summed = SummedChoices { sites: sites.targets, values: sites.values, entries, sweep };
         let tape = recorded.tape.finish();
-        let in_place = recorded.in_place.map(|in_place| in_place.on(&tape));
+        let in_place = recorded.in_place.map(|in_place| in_place.on(&tape, &self.graph));
         Ok(Some(Recording::new(self, (tape, in_place), targets, summed)))
     }
 

@@ -42,17 +42,21 @@ const READERS: usize = 4;
 const LARGEST: usize = 1024;
 
 /// The evaluation of a local density on the nodes of one frame.
-pub(crate) struct Evaluation<'a, const N: usize> {
+pub(crate) struct Evaluation<'a> {
     graph: &'a Store,
     code: &'a Code,
     base: NodeId,
-    registers: [Register<'a>; N],
+    registers: [Register<'a>; REGISTERS],
     /// The values that are neither numbers nor part of the trace.
     made: SmallVec<[Value; 4]>,
     /// True if a selection takes its other alternative.
     turned: bool,
     prior: ExactSum,
     likelihood: ExactSum,
+    /// Minus the scores that change: of the prior and the likelihood. They are the same for every
+    /// value, so only the first one adds them up.
+    removed: [ExactSum; 2],
+    is_first: bool,
 }
 
 impl Trace {
@@ -150,8 +154,19 @@ impl Graph {
     }
 
     /// Returns an evaluation of local densities, for [`Evaluation::weigh`].
-    pub fn evaluation<'a>(&'a self, code: &'a Code) -> Evaluation<'a, REGISTERS> {
-        Evaluation::new(self, code, [Register::Num(0.0); REGISTERS])
+    pub fn evaluation<'a>(&'a self, code: &'a Code) -> Evaluation<'a> {
+        Evaluation {
+            graph: &self.store,
+            code,
+            base: NodeId::default(),
+            registers: [Register::Num(0.0); REGISTERS],
+            made: SmallVec::new(),
+            turned: false,
+            prior: ExactSum::default(),
+            likelihood: ExactSum::default(),
+            removed: Default::default(),
+            is_first: true,
+        }
     }
 }
 
@@ -174,17 +189,18 @@ impl Store {
             return None;
         };
         let mut read = [Register::Num(0.0); PARAMETERS];
-        let read = read.get_mut(..args.len())?;
-        let mut e = Evaluation::new(self, &self.code, []);
-        e.base = n - self.slot_facts(n).slot;
+        let (read, frame) = (read.get_mut(..args.len())?, self[n].frame);
         for (to, o) in read.iter_mut().zip(args) {
-            *to = e.read(Input::Operand(*o))?;
+            if self.unready(frame, *o).is_some() {
+                return None;
+            }
+            *to = Register::of(self.value(frame, *o));
         }
         family(self.code.builtins.get(*builtin), read)
     }
 }
 
-impl<'a> Evaluation<'a, REGISTERS> {
+impl<'a> Evaluation<'a> {
     /// Returns the log weight of a value of the choice relative to the current one, with
     /// the likelihood raised to a power; `None` if the local densities do not cover it.
     pub fn weigh(
@@ -196,11 +212,17 @@ impl<'a> Evaluation<'a, REGISTERS> {
         power: f64,
     ) -> Option<f64> {
         self.begin(Register::of_datum(value)?);
-        self.prior.sub(self.graph[target].score);
+        if self.is_first {
+            self.removed[0].sub(self.graph[target].score);
+        }
         self.prior.add(dist.log_density_stored(value));
         local_densities
             .iter()
             .try_for_each(|placed| self.run(placed, local_densities.len() == 1))?;
+        if std::mem::take(&mut self.is_first) {
+            self.prior.merge(&self.removed[0]);
+            self.likelihood.merge(&self.removed[1]);
+        }
         Some(Weight::beside(&self.prior, &self.likelihood, power))
     }
 
@@ -209,8 +231,10 @@ impl<'a> Evaluation<'a, REGISTERS> {
         self.registers[0] = value;
         self.made.clear();
         self.turned = false;
-        self.prior = ExactSum::default();
-        self.likelihood = ExactSum::default();
+        if self.is_first {
+            self.removed = Default::default();
+        }
+        [self.prior, self.likelihood] = self.removed.clone();
     }
 
     /// Runs a local density. With `may_choose`, selections may take their other
@@ -288,7 +312,9 @@ impl<'a> Evaluation<'a, REGISTERS> {
                         parameters,
                         Register::of(&self.node(slot).value),
                     )?;
-                    self.prior.sub(self.node(slot).score);
+                    if self.is_first {
+                        self.removed[0].sub(self.node(slot).score);
+                    }
                     self.prior.add(score);
                 }
                 Instruction::Observe { slot, builtin, ref parameters, value } => {
@@ -297,7 +323,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     let observed = replaced.map_or_else(|| self.read(value), Some)?;
                     match self.log_density(builtin, parameters, observed) {
                         Some(score) => {
-                            self.graph.take_score(n, &mut self.likelihood);
+                            self.remove_score(n);
                             self.likelihood.add(score);
                         }
                         None => {
@@ -311,7 +337,7 @@ impl<'a> Evaluation<'a, REGISTERS> {
                 }
                 Instruction::Factor { slot, weight } => {
                     let weight = self.number(weight).filter(|w| !w.is_nan())?;
-                    self.likelihood.sub(self.node(slot).score);
+                    self.remove_score(self.base + slot);
                     self.likelihood.add(weight);
                 }
             }
@@ -379,12 +405,20 @@ impl<'a> Evaluation<'a, REGISTERS> {
             None => self.value(observed)?,
         };
         let score = self.graph.score_of_values(n, dist, &values, &observed).ok()?;
-        self.graph.take_score(n, &mut self.likelihood);
+        self.remove_score(n);
         match score {
             Score::One(score) => self.likelihood.add(score),
             Score::Sum(sum) => self.likelihood.merge(&sum),
         }
         Some(())
+    }
+
+    /// Removes the present score of an observation or factor.
+    #[inline(always)]
+    fn remove_score(&mut self, n: NodeId) {
+        if self.is_first {
+            self.graph.take_score(n, &mut self.removed[1]);
+        }
     }
 
     /// True if its selections can take their other alternatives without releasing
@@ -453,21 +487,6 @@ impl<'a> Evaluation<'a, REGISTERS> {
                     _ => None,
                 }
             }
-        }
-    }
-}
-
-impl<'a, const N: usize> Evaluation<'a, N> {
-    fn new(graph: &'a Store, code: &'a Code, registers: [Register<'a>; N]) -> Self {
-        Evaluation {
-            graph,
-            code,
-            base: NodeId::default(),
-            registers,
-            made: SmallVec::new(),
-            turned: false,
-            prior: ExactSum::default(),
-            likelihood: ExactSum::default(),
         }
     }
 

@@ -145,3 +145,17 @@ fn choices_read_twice_from_one_frame_are_left_to_updates() {
          }";
     compared(text);
 }
+
+#[test]
+fn scores_of_numbers_are_those_of_their_distributions() {
+    let families = "normal(0.3, 1.2) normal(1, 1) gamma(2, 0.5) beta(2, 3) poisson(3) binomial(4, 0.2) \
+        student_t(3, 0, 1) cauchy(0, 2) uniform(0, 0.5) flip(0.2) lognormal(0, 1) geometric(0.3)";
+    for family in families.split(") ").map(|f| format!("{})", f.trim_end_matches(')'))) {
+        for x in ["0", "1", "0.25", "3", "-2", "1e300"] {
+            let score = |text: String| crate::testing::trace(&text, 1).log_likelihood().to_bits();
+            let found = score(format!("observe {family} = {x};"));
+            let expected = score(format!("let d = {family}; observe d = {x};"));
+            assert_eq!(found, expected, "{family} {x}");
+        }
+    }
+}

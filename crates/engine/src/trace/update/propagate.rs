@@ -192,8 +192,10 @@ impl Graph {
             let step =
                 self.budget.count_operation(&self.store, n).and_then(|()| self.step(code, n));
             if let Err(e) = step {
+                // Others on the stack wait for their turn.
+                let running = |n: &NodeId| self.store[*n].state == State::Running;
                 self.update.failed.clear();
-                self.update.failed.extend(self.update.stack.drain(bottom..));
+                self.update.failed.extend(self.update.stack.drain(bottom..).filter(running));
                 return Err(e);
             }
         }
@@ -299,11 +301,34 @@ impl Graph {
 
     /// Makes one attempt to evaluate a node.
     fn step(&mut self, code: &Code, n: NodeId) -> Step {
-        if self.store[n].flags & WAS_STALE != 0 && self.incremental {
-            let mut changed = false;
+        let facts = &code.slots[self.store[n].op];
+        let (epoch, mut changed) = (self.update.epoch, false);
+        if let Some(reads) = &facts.reads {
+            let height = self.update.stack.len();
+            for (up, slot) in reads {
+                let d = match up {
+                    0 => n - facts.slot + *slot,
+                    _ => self.store.outer(self.store[n].frame, *up, *slot),
+                };
+                let dep = &self.store[d];
+                match dep.state {
+                    State::Clean => changed |= dep.changed == epoch,
+                    // After those before it.
+                    State::Running if self.update.stack.len() > height => break,
+                    _ => {
+                        self.need(d)?;
+                    }
+                }
+            }
+            // All that it reads in any case waits on the stack, the first on top.
+            if self.update.stack.len() > height {
+                self.update.stack[height..].reverse();
+                return Ok(Poll::Pending);
+            }
+        }
+        if self.store[n].flags & WAS_STALE != 0 && self.incremental && !changed {
             let mut wait = NodeId::NONE;
-            let epoch = self.update.epoch;
-            self.each_dep(n, |d, _| {
+            let look = |d: NodeId, _: bool| {
                 let dep = &self.store[d];
                 if !changed && wait == NodeId::NONE {
                     if dep.state != State::Clean {
@@ -312,7 +337,11 @@ impl Graph {
                         changed = true;
                     }
                 }
-            });
+            };
+            match facts.reads {
+                Some(_) => self.each_side_dep(n, look),
+                None => self.each_dep(n, look),
+            }
             if !changed {
                 if wait != NodeId::NONE {
                     return self.need(wait);

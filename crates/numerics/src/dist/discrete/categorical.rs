@@ -37,24 +37,33 @@ impl Categorical {
 
 /// Returns the sum of the weights, if they are valid.
 fn total(weights: &[f64]) -> Result<f64, ParamError> {
-    let total: f64 = weights.iter().sum();
-    // A weight that is not finite makes the sum infinite or NaN.
-    if total > 0.0 && total.is_finite() && weights.iter().all(|w| *w >= 0.0) {
-        return Ok(total);
+    let mut total = -0.0;
+    for w in weights {
+        if w.is_nan() || *w < 0.0 {
+            return Err(fault(weights));
+        }
+        total += w;
     }
+    // A weight that is not finite makes the sum infinite.
+    if total > 0.0 && total < f64::INFINITY { Ok(total) } else { Err(fault(weights)) }
+}
+
+#[cold]
+fn fault(weights: &[f64]) -> ParamError {
     if let Some(w) = weights.iter().find(|w| !(w.is_finite() && **w >= 0.0)) {
-        return Err(Categorical::bad("weights", w, "must be finite and not negative"));
+        return Categorical::bad("weights", w, "must be finite and not negative");
     }
-    Err(Categorical::bad("weights", total, "must have a positive, finite sum"))
+    let total: f64 = weights.iter().sum();
+    Categorical::bad("weights", total, "must have a positive, finite sum")
 }
 
 #[inline]
 fn log_probability(weights: &[f64], total: f64, x: f64) -> f64 {
-    let i = x as usize;
+    let i = x as i64;
     if i as f64 != x {
         return f64::NEG_INFINITY;
     }
-    match weights.get(i) {
+    match weights.get(i as usize) {
         Some(w) if *w > 0.0 && total == 1.0 => libm::log(*w),
         Some(w) if *w > 0.0 => libm::log(*w) - libm::log(total),
         _ => f64::NEG_INFINITY,
