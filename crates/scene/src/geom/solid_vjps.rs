@@ -52,8 +52,9 @@ impl Solid {
         mut f: impl FnMut(u32, DVec3, T),
     ) {
         if let Some(body) = self.body() {
+            let vertex = body.vertices();
             for (number, with) in numbers {
-                if let Some(at) = body.vertex(number) {
+                if let Some(at) = vertex(number) {
                     f(number, at, with);
                 }
             }
