@@ -27,7 +27,8 @@ pub(super) struct Pair {
 pub(super) type Past = VecDeque<Pair>;
 
 /// How far each coordinate moves for a change of the gradient, in the climbs of some choices so far:
-/// the geometric mean of the two estimates that the inverse curvature and the curvature give.
+/// the geometric mean of the diagonals of an inverse curvature and of a curvature, as a metric of
+/// states and forces has it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scales {
     pairs: u32,
@@ -61,6 +62,9 @@ impl Scales {
                 .map(|sums| 1e-12 * sums.iter().sum::<f64>() + f64::MIN_POSITIVE);
             let ratio = |(s, c): (&f64, &f64)| ((s + least) / (c + most)).sqrt();
             self.ratios.extend(self.steps.iter().zip(&self.changes).map(ratio));
+            if !self.ratios.iter().all(|r| r.is_finite()) {
+                *self = Scales::default();
+            }
         }
     }
 
@@ -250,5 +254,30 @@ mod tests {
         climb_all(&mut trace, 60);
         let x = trace.stored(trace.all_targets()[0]).and_then(|x| x.num()).unwrap();
         assert!((x - 50.0).abs() < 1e-3, "{x}");
+    }
+
+    /// Twelve choices whose deviations differ by a factor of 560, all one deviation off: a climb
+    /// has to find each curvature, one after it knows them.
+    #[test]
+    fn scales_of_one_climb_serve_the_next() {
+        let deviation = |i: usize| 10f64.powf(i as f64 / 4.0);
+        let assume = |i| format!("assume x{i} ~ normal(0, {});", deviation(i));
+        let text: String = (0..12).map(assume).collect();
+        let gain = |steps: u32, scales: &mut Scales| {
+            let mut trace = crate::testing::trace(&text, 1);
+            for i in 0..12 {
+                trace.set(&format!("@x{i}"), deviation(i), Draws::default()).unwrap();
+            }
+            let (at, mut memory) = (StepContext::new(1, 0, 0), Memory::default());
+            let targets = trace.all_targets().to_vec();
+            let (mut system, begun) =
+                System::begin(&mut trace, &at, &targets, None, &mut memory).unwrap().unwrap();
+            let top = ascend(&mut system, &begun, steps, &mut Past::new(), scales).unwrap();
+            top.log_density - begun.log_density
+        };
+        let mut known = Scales::default();
+        assert!((gain(200, &mut known) - 6.0).abs() < 1e-6);
+        assert!(gain(3, &mut Scales::default()) < 5.5);
+        assert!(gain(3, &mut known) > 5.99);
     }
 }
