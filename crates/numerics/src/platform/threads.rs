@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 /// The threads among which [`available`] divides work; 0: one per core.
 static MOST: AtomicUsize = AtomicUsize::new(0);
 
-/// Lets this process divide work among so many threads from now on (0: one per core). Each takes
+/// Lets this process divide work among this many threads from now on (0: one per core). Each takes
 /// memory of its own.
 pub fn limit(threads: usize) {
     MOST.store(threads, Ordering::Relaxed);

@@ -68,7 +68,7 @@ impl Scales {
         }
     }
 
-    /// The scales of so many coordinates, if they are known.
+    /// The scales, if they are known and of this number of coordinates.
     fn of(&self, n: usize) -> Option<&[f64]> {
         Some(&self.ratios[..]).filter(|ratios| n > 0 && ratios.len() == n)
     }
