@@ -4,6 +4,7 @@ use crate::args::{Job, Live, Run};
 use crate::programs::explain::{Explanation, explain};
 use pcadlang_engine::lang::plan::{Plan, StepKind};
 use pcadlang_inference::ChainResult;
+use pcadlang_numerics::platform::threads;
 use pcadlang_report::{RunDir, modes_table, seconds, table};
 use pcadlang_runs::failure::{Failure, plain};
 use pcadlang_runs::files::write_in;
@@ -19,6 +20,7 @@ use std::path::Path;
 /// Runs a program and writes its folder.
 pub fn run(a: &Run) -> Result<(), Failure> {
     let job = &quality::filled(&a.job, a.quiet)?;
+    threads::limit(job.sampling.threads.unwrap_or(0) as usize);
     let ready = inputs::prepare(job, a.quiet)?;
     let (sources, warnings) = ready.model.warnings();
     if !warnings.is_empty() && !a.quiet {

@@ -27,9 +27,8 @@ use crate::objects::{FoundObject, View as ObjectView};
 use area::Area;
 use consensus::{ONE, PersonBox, Run, by_person, consensus, prominence, same, seen, sure};
 use landmarks::View;
-use pcadlang_numerics::platform::threads::{both, side_by_side};
+use pcadlang_numerics::platform::threads::{available, both, side_by_side};
 use pcadlang_scene::vision::Photo;
-use std::thread::available_parallelism;
 use window::Window;
 
 /// How much views are padded, as a fraction of the longer side.
@@ -110,7 +109,7 @@ impl PeopleFinder {
     }
 
     /// Returns the people in a photograph, the most prominent first. `threads` views (0:
-    /// the number of cores) are processed in parallel.
+    /// as many as [`available`]) are processed in parallel.
     pub fn find(
         &self,
         photo: &Photo,
@@ -144,8 +143,7 @@ impl PeopleFinder {
         };
         let views = areas.iter().flat_map(|area| [false, true].map(|mirrored| (area, mirrored)));
         let mut looked: Vec<_> = views.map(|view| (view, Vec::new())).collect();
-        let threads =
-            if threads == 0 { available_parallelism().map_or(1, usize::from) } else { threads };
+        let threads = if threads == 0 { available() } else { threads };
         // A view and its mirror image, which take as long, go to different threads.
         let mut parts: Vec<Vec<_>> = (0..threads.min(looked.len())).map(|_| Vec::new()).collect();
         let count = parts.len().max(1);

@@ -4,6 +4,23 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
+/// The threads among which [`available`] divides work; 0: one per core.
+static MOST: AtomicUsize = AtomicUsize::new(0);
+
+/// Lets this process divide work among this many threads from now on (0: one per core). Each takes
+/// memory of its own.
+pub fn limit(threads: usize) {
+    MOST.store(threads, Ordering::Relaxed);
+}
+
+/// The number of threads among which work is divided that does not say how many it wants.
+pub fn available() -> usize {
+    match MOST.load(Ordering::Relaxed) {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        most => most,
+    }
+}
+
 /// A pool of threads. It has none on WebAssembly, or if they cannot be created.
 pub struct Pool {
     #[cfg(not(target_family = "wasm"))]
@@ -46,7 +63,7 @@ pub fn in_parallel<I: Send, T: Send>(
     Pool::new(threads).map(items, one)
 }
 
-/// Runs `work` for every part, each on its own thread, and waits for all. It does not use
+/// Runs `work` for every part, each on its own thread but the last, and waits for all. It does not use
 /// a [`Pool`]: a pool's waiting thread takes up other tasks, which could need a lock that
 /// the caller holds.
 pub fn side_by_side<T: Send>(parts: impl IntoIterator<Item = T>, work: impl Fn(usize, T) + Sync) {
@@ -54,8 +71,12 @@ pub fn side_by_side<T: Send>(parts: impl IntoIterator<Item = T>, work: impl Fn(u
     {
         let work = &work;
         std::thread::scope(|scope| {
-            for (i, part) in parts.into_iter().enumerate() {
-                scope.spawn(move || work(i, part));
+            let mut parts = parts.into_iter().enumerate().peekable();
+            while let Some((i, part)) = parts.next() {
+                match parts.peek() {
+                    Some(_) => drop(scope.spawn(move || work(i, part))),
+                    None => work(i, part),
+                }
             }
         });
     }
@@ -63,13 +84,12 @@ pub fn side_by_side<T: Send>(parts: impl IntoIterator<Item = T>, work: impl Fn(u
     parts.into_iter().enumerate().for_each(|(i, part)| work(i, part));
 }
 
-/// Applies `one` to each item on threads of its own, one per core; results are in order.
+/// Applies `one` to each item on as many threads as are [`available`]; results are in order.
 /// Like [`side_by_side`], it may be called by one who holds a lock.
 pub fn map_side_by_side<I: Sync, T: Send>(items: &[I], one: impl Fn(&I) -> T + Sync) -> Vec<T> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::with_capacity(items.len()));
-    side_by_side(0..cores.min(items.len()), |_, _| {
+    side_by_side(0..available().min(items.len()), |_, _| {
         loop {
             let i = next.fetch_add(1, Ordering::Relaxed);
             let Some(item) = items.get(i) else { break };
@@ -82,15 +102,16 @@ pub fn map_side_by_side<I: Sync, T: Send>(items: &[I], one: impl Fn(&I) -> T + S
     done.into_iter().map(|(_, result)| result).collect()
 }
 
-/// Does two things, the first on a thread of its own.
+/// Does two things, the first on a thread of its own if two are [`available`].
 pub fn both<A: Send, B>(one: impl FnOnce() -> A + Send, other: impl FnOnce() -> B) -> (A, B) {
     #[cfg(not(target_family = "wasm"))]
-    return std::thread::scope(|scope| {
-        let one = scope.spawn(one);
-        let other = other();
-        (one.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), other)
-    });
-    #[cfg(target_family = "wasm")]
+    if available() > 1 {
+        return std::thread::scope(|scope| {
+            let one = scope.spawn(one);
+            let other = other();
+            (one.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), other)
+        });
+    }
     (one(), other())
 }
 

@@ -51,9 +51,14 @@ impl Solid {
         numbers: impl IntoIterator<Item = (u32, T)>,
         mut f: impl FnMut(u32, DVec3, T),
     ) {
+        let mut numbers = numbers.into_iter().peekable();
+        if numbers.peek().is_none() {
+            return;
+        }
         if let Some(body) = self.body() {
+            let vertex = body.vertices();
             for (number, with) in numbers {
-                if let Some(at) = body.vertex(number) {
+                if let Some(at) = vertex(number) {
                     f(number, at, with);
                 }
             }

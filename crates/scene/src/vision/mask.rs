@@ -163,6 +163,8 @@ pub struct MaskLikelihood {
     /// The log probabilities of a pixel that is not observed on the object, and of one that is,
     /// by the covered parts of [`PARTS`]: drawn fractions are whole numbers of them.
     logs: Vec<[f64; 2]>,
+    /// Their derivatives with respect to the fraction.
+    slopes: Vec<[f64; 2]>,
 }
 
 /// The samples of a pixel from which fractions are drawn.
@@ -178,13 +180,13 @@ impl MaskLikelihood {
                 return Err(VisionError::Range { name, rule: "strictly between 0 and 1", value });
             }
         }
-        let mut all =
-            MaskLikelihood { observed: observed.clone(), eps_in, eps_out, logs: Vec::new() };
-        let log = |k: usize| {
+        let (logs, slopes, observed) = (Vec::new(), Vec::new(), observed.clone());
+        let mut all = MaskLikelihood { observed, eps_in, eps_out, logs, slopes };
+        for k in 0..=PARTS {
             let fraction = k as f64 / PARTS as f64;
-            [false, true].map(|o| libm::log(all.probability(fraction, o)))
-        };
-        all.logs = (0..=PARTS).map(log).collect();
+            all.logs.push([false, true].map(|o| libm::log(all.probability(fraction, o))));
+            all.slopes.push([false, true].map(|o| all.slope(fraction, o)));
+        }
         Ok(all)
     }
 
@@ -259,16 +261,11 @@ impl MaskLikelihood {
         height: u32,
     ) -> Result<f64, VisionError> {
         self.check(coverage.len(), width, height)?;
+        if let Some(sum) = self.log_likelihood_parts(coverage) {
+            return Ok(sum);
+        }
         let mut sum = 0.0;
         for (&c, &o) in coverage.iter().zip(&self.observed.data) {
-            let parts = c * PARTS as f32;
-            let whole = parts as i32;
-            if whole as f32 == parts
-                && let Some(logs) = self.logs.get(whole as usize)
-            {
-                sum += logs[usize::from(o)];
-                continue;
-            }
             let c = f64::from(c);
             if !(0.0..=1.0).contains(&c) {
                 return Err(VisionError::Range {
@@ -280,6 +277,35 @@ impl MaskLikelihood {
             sum += libm::log(self.probability(c, o));
         }
         Ok(sum)
+    }
+
+    /// The same where all fractions are whole numbers of [`PARTS`]; `None` if they are not.
+    fn log_likelihood_parts(&self, coverage: &[f32]) -> Option<f64> {
+        let mut places = vec![0u16; coverage.len()];
+        let all_whole = vectorised(
+            #[inline(always)]
+            || {
+                let mut all_whole = true;
+                let pixels = coverage.iter().zip(&self.observed.data);
+                for (place, (c, o)) in places.iter_mut().zip(pixels) {
+                    let parts = c * PARTS as f32;
+                    let whole = parts as i32;
+                    all_whole &= (whole as f32 == parts) & (whole >= 0) & (whole <= PARTS as i32);
+                    *place = (2 * whole) as u16 + u16::from(*o);
+                }
+                all_whole
+            },
+        );
+        let logs = self.logs.as_flattened();
+        let of = |place: &u16| logs.get(usize::from(*place)).copied().unwrap_or_default();
+        // Four sums, none of which waits for another.
+        let (fours, rest) = places.as_chunks::<4>();
+        let mut sums = [0.0; 4];
+        for four in fours {
+            sums.iter_mut().zip(four).for_each(|(sum, place)| *sum += of(place));
+        }
+        let sum = sums.iter().sum::<f64>() + rest.iter().map(of).sum::<f64>();
+        all_whole.then_some(sum)
     }
 
     /// The probability of what is observed at a pixel of which this fraction is covered.
@@ -299,10 +325,18 @@ impl MaskLikelihood {
     /// Returns the derivative of [`MaskLikelihood::log_likelihood_coverage`] with respect to
     /// the fraction of a pixel that is covered, at a fraction; 0 if there is no such pixel.
     pub fn gain_coverage(&self, pixel: usize, fraction: f32) -> f64 {
-        self.observed.data.get(pixel).map_or(0.0, |observed| {
-            let [miss, hit] = self.ends(*observed);
-            (hit - miss) / self.probability(f64::from(fraction), *observed)
-        })
+        let Some(observed) = self.observed.data.get(pixel) else { return 0.0 };
+        let parts = fraction * PARTS as f32;
+        let whole = parts as usize;
+        match self.slopes.get(whole).filter(|_| whole as f32 == parts) {
+            Some(slopes) => slopes[usize::from(*observed)],
+            None => self.slope(f64::from(fraction), *observed),
+        }
+    }
+
+    fn slope(&self, fraction: f64, observed: bool) -> f64 {
+        let [miss, hit] = self.ends(observed);
+        (hit - miss) / self.probability(fraction, observed)
     }
 
     /// Samples a mask given the fraction of every pixel that the rendered object covers.

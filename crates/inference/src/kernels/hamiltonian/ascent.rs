@@ -1,6 +1,9 @@
 //! Ascent to a mode by L-BFGS (Nocedal & Wright 2006, algorithm 7.4) with a backtracking
 //! line search. The mode is that of the density in the unconstrained space, in which the
 //! kernels of this family move.
+//!
+//! Climbs of the same choices share how far coordinates move ([`Scales`]): L-BFGS alone has to
+//! find that in each, in more steps than it has.
 
 use super::memory::Memory;
 use super::point::Point;
@@ -23,12 +26,60 @@ pub(super) struct Pair {
 /// The last steps of a climb, which remain valid if it is interrupted.
 pub(super) type Past = VecDeque<Pair>;
 
+/// How far each coordinate moves for a change of the gradient, in the climbs of some choices so far:
+/// the geometric mean of the diagonals of an inverse curvature and of a curvature, as a metric of
+/// states and forces has it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scales {
+    pairs: u32,
+    /// Sums of the squares of steps and of changes, each by the product of both.
+    steps: Vec<f64>,
+    changes: Vec<f64>,
+    /// Empty until enough is known.
+    ratios: Vec<f64>,
+}
+
+/// The number of steps from which scales are known.
+const KNOWN: u32 = 20;
+
+impl Scales {
+    fn learn(&mut self, Pair { step, change }: &Pair) {
+        let n = step.len();
+        if self.steps.len() != n {
+            *self = Scales { steps: vec![0.0; n], changes: vec![0.0; n], ..Scales::default() };
+        }
+        self.pairs += 1;
+        let by = 1.0 / dot(step, change);
+        let add = |sums: &mut [f64], xs: &[f64]| {
+            sums.iter_mut().zip(xs).for_each(|(sum, x)| *sum += x * x * by);
+        };
+        add(&mut self.steps, step);
+        add(&mut self.changes, change);
+        if self.pairs >= KNOWN {
+            self.ratios.clear();
+            // No coordinate is infinitely stiff or soft.
+            let [least, most] = [&self.steps, &self.changes]
+                .map(|sums| 1e-12 * sums.iter().sum::<f64>() + f64::MIN_POSITIVE);
+            let ratio = |(s, c): (&f64, &f64)| ((s + least) / (c + most)).sqrt();
+            self.ratios.extend(self.steps.iter().zip(&self.changes).map(ratio));
+            if !self.ratios.iter().all(|r| r.is_finite()) {
+                *self = Scales::default();
+            }
+        }
+    }
+
+    /// The scales, if they are known and of this number of coordinates.
+    fn of(&self, n: usize) -> Option<&[f64]> {
+        Some(&self.ratios[..]).filter(|ratios| n > 0 && ratios.len() == n)
+    }
+}
+
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// The direction of ascent: the gradient times the inverse curvature from the last steps.
-fn direction(gradient: &[f64], past: &Past) -> Vec<f64> {
+fn direction(gradient: &[f64], past: &Past, scales: &Scales) -> Vec<f64> {
     let mut q = gradient.to_vec();
     let mut shares = Vec::with_capacity(past.len());
     for p in past.iter().rev() {
@@ -36,10 +87,19 @@ fn direction(gradient: &[f64], past: &Past) -> Vec<f64> {
         q.iter_mut().zip(&p.change).for_each(|(q, y)| *q -= share * y);
         shares.push(share);
     }
-    if let Some(p) = past.back() {
-        let scale = dot(&p.step, &p.change) / dot(&p.change, &p.change);
+    let scales = scales.of(q.len());
+    if let Some(scales) = scales {
+        q.iter_mut().zip(scales).for_each(|(q, s)| *q *= s);
+    }
+    if let Some(Pair { step, change }) = past.back() {
+        let square = |(c, s): (&f64, &f64)| c * c * s;
+        let length = match scales {
+            Some(scales) => change.iter().zip(scales).map(square).sum(),
+            None => dot(change, change),
+        };
+        let scale = dot(step, change) / length;
         q.iter_mut().for_each(|q| *q *= scale);
-    } else {
+    } else if scales.is_none() {
         let length = dot(gradient, gradient).sqrt().max(1.0);
         q.iter_mut().for_each(|q| *q /= length);
     }
@@ -66,21 +126,22 @@ fn climb(system: &mut System, from: &Point, along: &[f64]) -> TraceResult<Option
     Ok(None)
 }
 
-/// Returns the point reached by at most `steps` steps uphill; `past` has the steps
-/// before.
+/// Returns the point reached by at most `steps` steps uphill; `past` has the steps before, and
+/// `scales` learns from them.
 pub(super) fn ascend(
     system: &mut System,
     begun: &Arc<Point>,
     steps: u32,
     past: &mut Past,
+    scales: &mut Scales,
 ) -> TraceResult<Arc<Point>> {
     let mut here = Arc::clone(begun);
     for _ in 0..steps {
-        let mut along = direction(&here.gradient, past);
+        let mut along = direction(&here.gradient, past, scales);
         let slope = dot(&along, &here.gradient);
         if slope.is_nan() || slope <= 0.0 {
             past.clear();
-            along = direction(&here.gradient, past);
+            along = direction(&here.gradient, past, scales);
         }
         let Some(next) = climb(system, &here, &along)? else {
             if past.is_empty() {
@@ -94,7 +155,9 @@ pub(super) fn ascend(
             here.gradient.iter().zip(&next.gradient).map(|(a, b)| a - b).collect();
         let gain = next.log_density - here.log_density;
         if dot(&step, &change) > 1e-12 * dot(&change, &change) {
-            past.push_back(Pair { step, change });
+            let pair = Pair { step, change };
+            scales.learn(&pair);
+            past.push_back(pair);
             if past.len() > MEMORY {
                 past.pop_front();
             }
@@ -124,7 +187,8 @@ pub(crate) fn approach(trace: &mut Trace, at: &StepContext) -> TraceResult<()> {
     };
     let (mut here, mut past) = (Arc::clone(&begun), Past::new());
     for _ in 0..FEW {
-        let Ok(next) = ascend(&mut system, &here, 1, &mut past) else { break };
+        let alone = &mut Scales::default();
+        let Ok(next) = ascend(&mut system, &here, 1, &mut past, alone) else { break };
         let gain = next.log_density - here.log_density;
         here = next;
         if gain < 10.0 + here.y.len() as f64 {
@@ -148,7 +212,7 @@ mod tests {
     #[test]
     fn the_direction_leads_to_the_top_of_a_round_hill() {
         let past = VecDeque::from([Pair { step: vec![1.0, 0.0], change: vec![4.0, 0.0] }]);
-        assert_eq!(direction(&[8.0, 4.0], &past), [2.0, 1.0]);
+        assert_eq!(direction(&[8.0, 4.0], &past, &Scales::default()), [2.0, 1.0]);
     }
 
     /// Makes at most that many steps with all choices from a state.
@@ -157,7 +221,8 @@ mod tests {
         let targets = trace.all_targets().to_vec();
         let (mut system, begun) =
             System::begin(trace, &at, &targets, None, &mut memory).unwrap().unwrap();
-        let top = ascend(&mut system, &begun, steps, &mut Past::new()).unwrap();
+        let top =
+            ascend(&mut system, &begun, steps, &mut Past::new(), &mut Scales::default()).unwrap();
         assert!(system.finish_at(Some(&top)).unwrap());
     }
 
@@ -189,5 +254,30 @@ mod tests {
         climb_all(&mut trace, 60);
         let x = trace.stored(trace.all_targets()[0]).and_then(|x| x.num()).unwrap();
         assert!((x - 50.0).abs() < 1e-3, "{x}");
+    }
+
+    /// Twelve choices whose deviations differ by a factor of 560, all one deviation off: a climb
+    /// has to find each curvature, one after it knows them.
+    #[test]
+    fn scales_of_one_climb_serve_the_next() {
+        let deviation = |i: usize| 10f64.powf(i as f64 / 4.0);
+        let assume = |i| format!("assume x{i} ~ normal(0, {});", deviation(i));
+        let text: String = (0..12).map(assume).collect();
+        let gain = |steps: u32, scales: &mut Scales| {
+            let mut trace = crate::testing::trace(&text, 1);
+            for i in 0..12 {
+                trace.set(&format!("@x{i}"), deviation(i), Draws::default()).unwrap();
+            }
+            let (at, mut memory) = (StepContext::new(1, 0, 0), Memory::default());
+            let targets = trace.all_targets().to_vec();
+            let (mut system, begun) =
+                System::begin(&mut trace, &at, &targets, None, &mut memory).unwrap().unwrap();
+            let top = ascend(&mut system, &begun, steps, &mut Past::new(), scales).unwrap();
+            top.log_density - begun.log_density
+        };
+        let mut known = Scales::default();
+        assert!((gain(200, &mut known) - 6.0).abs() < 1e-6);
+        assert!(gain(3, &mut Scales::default()) < 5.5);
+        assert!(gain(3, &mut known) > 5.99);
     }
 }

@@ -7,7 +7,7 @@
 //! modes, drawn by their evidence: the chain then begins where the mass is, and not in
 //! the mode it happened to climb to.
 
-use super::ascent::{Past, ascend};
+use super::ascent::{Past, Scales, ascend};
 use super::laplace::Laplace;
 use super::memory::Memory;
 use super::system::System;
@@ -276,7 +276,8 @@ impl Modes {
             trace.commit();
             if let Some(first) = &mut self.first {
                 let (targets, _) = first.members(trace, &mut at.stream());
-                climb(trace, &at, &targets, FIRST, &mut Past::new())?;
+                let (past, scales) = (&mut Past::new(), &mut Scales::default());
+                climb(trace, &at, &targets, FIRST, (past, scales))?;
             }
             let likely = trace.log_likelihood();
             let place = best.partition_point(|(_, l)| *l >= likely);
@@ -288,13 +289,18 @@ impl Modes {
         Ok(best.into_iter().map(|(state, likely)| Climb::new(state, likely)).collect())
     }
 
-    /// The ends of climbs, the highest first. Half of them continue after a quarter of
-    /// the steps, and a quarter of them after half of the steps (successive halving:
-    /// Jamieson & Talwalkar 2016).
-    fn tops(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<Vec<Climb>> {
+    /// The ends of climbs, the highest first. Half of them continue after an eighth of the
+    /// steps, and half of those after each doubling of the steps (successive halving: Jamieson &
+    /// Talwalkar 2016).
+    fn tops(
+        &mut self,
+        trace: &mut Trace,
+        at: &StepContext,
+        scales: &mut Scales,
+    ) -> TraceResult<Vec<Climb>> {
         let mut climbs = self.starts(trace, at)?;
         let mut gone = 0;
-        for (round, share) in [4, 2, 1].into_iter().enumerate() {
+        for (round, share) in [8, 4, 2, 1].into_iter().enumerate() {
             let steps = self.steps / share - gone;
             gone += steps;
             let mut climbed = 0;
@@ -305,7 +311,7 @@ impl Modes {
                 climbed += 1;
                 trace.restore(&c.state, at.draws(0))?;
                 let (targets, _) = self.scope.members(trace, &mut at.stream());
-                climb(trace, at, &targets, steps, &mut c.past)?;
+                climb(trace, at, &targets, steps, (&mut c.past, scales))?;
                 let mut log_jacobian = 0.0;
                 if let Some(here) = Here::of(trace, &targets) {
                     (c.discrete, c.y, log_jacobian) = (here.discrete, here.y, here.log_jacobian);
@@ -331,24 +337,31 @@ impl Modes {
         } else {
             trace.under_surrogates(&self.coarse)?
         };
-        let Some(mut surrogate) = coarse else { return self.search(trace, at) };
+        let mut scales = Scales::default();
+        let Some(mut surrogate) = coarse else { return self.search(trace, at, &mut scales) };
         surrogate.observe_as(trace)?;
-        self.search(&mut surrogate, at)?;
+        self.search(&mut surrogate, at, &mut scales)?;
         trace.propose_choices_of(&surrogate)?;
         trace.commit();
         if at.adapting {
             // The mode is that of the surrogates; that of the observations is near it.
             let (targets, _) = self.scope.members(trace, &mut at.stream());
-            climb(trace, &StepContext { power: 1.0, ..*at }, &targets, LAST, &mut Past::new())?;
+            let at = StepContext { power: 1.0, ..*at };
+            climb(trace, &at, &targets, LAST, (&mut Past::new(), &mut scales))?;
         }
         Ok(())
     }
 
     /// Searches for modes of a trace, and in warm-up leaves it in one of them.
-    fn search(&mut self, trace: &mut Trace, at: &StepContext) -> TraceResult<()> {
+    fn search(
+        &mut self,
+        trace: &mut Trace,
+        at: &StepContext,
+        scales: &mut Scales,
+    ) -> TraceResult<()> {
         let at = &StepContext { power: 1.0, ..*at };
         let begun = trace.constraints();
-        let tops = self.tops(trace, at)?;
+        let tops = self.tops(trace, at, scales)?;
         let highest = tops.first().map_or(0.0, |t| t.height);
         let mut signature = None;
         let mut modes: Vec<Mode> = Vec::new();
@@ -403,11 +416,11 @@ fn climb(
     at: &StepContext,
     targets: &[Target],
     steps: u32,
-    past: &mut Past,
+    (past, scales): (&mut Past, &mut Scales),
 ) -> TraceResult<()> {
     let mut memory = Memory::default();
     if let Some((mut system, here)) = System::begin(trace, at, targets, None, &mut memory)? {
-        let top = ascend(&mut system, &here, steps, past)?;
+        let top = ascend(&mut system, &here, steps, past, scales)?;
         system.finish_at(Some(&top))?;
     }
     Ok(())

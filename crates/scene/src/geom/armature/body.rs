@@ -281,6 +281,9 @@ impl Armature {
             if weights[k] != 0.0 {
                 amount -= std::mem::take(&mut Arc::make_mut(&mut weights)[k]);
             }
+            if amount == 0.0 {
+                continue;
+            }
             m.move_joints(amount, &mut heads, &mut tails);
             added.push((k, amount));
             for (d, anchor) in points.iter_mut().zip(&self.skin.anchors) {

@@ -48,11 +48,13 @@ impl PosedBody {
         PosedBody { body: Arc::clone(&pose.body), joints, place: Affine::IDENTITY, pose }
     }
 
-    /// Returns a vertex of the posed parts' meshes, by its number, in the scene.
-    pub(crate) fn vertex(&self, number: u32) -> Option<DVec3> {
-        let at = *self.body.whole().of_parts.get(number as usize)?;
-        let p = self.pose.positions(None).get(at as usize)?;
-        Some(self.place.point(p.as_dvec3()))
+    /// What returns a vertex of the posed parts' meshes, by its number, in the scene.
+    pub(crate) fn vertices(&self) -> impl Fn(u32) -> Option<DVec3> {
+        let (numbers, positions) = (&self.body.whole().of_parts[..], self.pose.positions(None));
+        move |number| {
+            let at = *numbers.get(number as usize)?;
+            Some(self.place.point(positions.get(at as usize)?.as_dvec3()))
+        }
     }
 
     /// Returns the joints in rig order, in the scene's axes, with lengths in scene units.

@@ -21,22 +21,32 @@ impl Fractions {
     ) -> Option<ByVertex> {
         let outline = self.outline.as_ref()?;
         let width = camera.width as usize;
-        PLACES.with_borrow_mut(|places| {
-            places.begin(solid.vertex_count());
+        SCRATCH.with_borrow_mut(|Scratch { by_edge, places }| {
+            by_edge.clear();
+            by_edge.resize(outline.edges.len(), [0.0; 2]);
             for Crossing { row, column, edge, enters } in &outline.crossings {
                 let (row, column) = (*row as usize, *column as usize);
-                let Some(edge) = outline.edges.get(*edge as usize) else { continue };
+                let Some([all, moment]) = by_edge.get_mut(*edge as usize) else { continue };
                 if column == 0 || column == width * COLUMNS {
                     continue;
                 }
-                // What it gains by a pixel to the right.
                 let gain = gain(row / ROWS * width + column / COLUMNS);
-                let gain = if *enters { -gain } else { gain } / ROWS as f64;
-                let share = (row as f64 - edge.from[1]) / (edge.to[1] - edge.from[1]);
+                let gain = if *enters { -gain } else { gain };
+                *all += gain;
+                *moment += gain * row as f64;
+            }
+            places.begin(solid.vertex_count());
+            for (edge, [all, moment]) in outline.edges.iter().zip(&*by_edge) {
+                if *all == 0.0 && *moment == 0.0 {
+                    continue;
+                }
+                // A place in a row is a mean of the ends, whose weights are linear in the row.
+                let lower = (moment - all * edge.from[1]) / (edge.to[1] - edge.from[1]);
                 // Of x by y, in pixels.
                 let slope = edge.slope * (ROWS as f64 / COLUMNS as f64);
-                for (v, share) in edge.vertices.into_iter().zip([1.0 - share, share]) {
-                    places.add(v, [gain * share, -gain * share * slope]);
+                for (v, gain) in edge.vertices.into_iter().zip([all - lower, lower]) {
+                    let gain = gain / ROWS as f64;
+                    places.add(v, [gain, -gain * slope]);
                 }
             }
             let mut out = Vec::with_capacity(places.by.len());
@@ -54,7 +64,16 @@ impl Fractions {
 }
 
 thread_local! {
-    static PLACES: RefCell<ByPlace> = RefCell::default();
+    static SCRATCH: RefCell<Scratch> = RefCell::default();
+}
+
+/// Buffers that are reused.
+#[derive(Default)]
+struct Scratch {
+    /// For each side, what it gains by a pixel to the right in all rows that it crosses, and the
+    /// sum of each row's gain times the row.
+    by_edge: Vec<[f64; 2]>,
+    places: ByPlace,
 }
 
 /// Derivatives with respect to the places of vertices in the picture, in pixels.

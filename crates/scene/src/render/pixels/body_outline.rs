@@ -18,7 +18,7 @@ pub(in crate::render) struct FollowedBody {
     /// The bits of its placement.
     place: [u64; 12],
     /// Each vertex in the picture, in pixels.
-    places: Vec<[f32; 2]>,
+    places: Vec<[f64; 2]>,
     /// How faces are drawn: 1 counter-clockwise, -1 clockwise, 0 not; after the last there is a
     /// 0, for no face.
     drawn: Vec<i8>,
@@ -68,7 +68,7 @@ impl Samples {
                 for (_, faces) in &moving {
                     let own = drawn[faces.clone()].iter_mut().zip(&whole.triangles[faces.clone()]);
                     for (drawn, corners) in own {
-                        let turn = clockwise(corners.map(|v| places[v as usize].map(f64::from)));
+                        let turn = clockwise(corners.map(|v| places[v as usize]));
                         *drawn = i8::from(turn * f64::from(sign) <= 0.0) * sign;
                     }
                 }
@@ -95,13 +95,13 @@ impl Samples {
         &mut self,
         whole: &Whole,
         stretch: &SurfaceStretch,
-        places: &[[f32; 2]],
+        places: &[[f64; 2]],
         drawn: &[i8],
     ) {
         for side in &whole.sides()[stretch.sides.clone()] {
             let [own, other] = side.faces.map(|f| drawn[f as usize]);
             if own != other {
-                let ends = side.vertices.map(|v| in_samples(places[v as usize].map(f64::from)));
+                let ends = side.vertices.map(|v| in_samples(places[v as usize]));
                 let edge = Edge::new(ends, side.vertices, i32::from(own - other), self.rows);
                 if edge.counts() {
                     self.edges.push(edge);

@@ -357,8 +357,8 @@ impl Samples {
             // Where the row before this one ends, if nothing is in it yet.
             (*begin, sum) = (sum, sum + here);
         }
-        all.clear();
-        all.resize(sum as usize, 0);
+        // Every place is written.
+        all.resize((sum as usize).max(all.len()), 0);
         let most = (self.width * COLUMNS) as f64;
         for (i, edge) in (0u64..).zip(&self.edges) {
             let [begin, end] = edge.rows;
@@ -390,7 +390,7 @@ impl Samples {
 
     /// The fraction of each pixel, and where covered samples begin and end.
     fn count(&self, lists: &mut RowLists) -> (Arc<[f32]>, Vec<Crossing>) {
-        let mut crossings = Vec::with_capacity(4 * self.rows);
+        let mut crossings = Vec::with_capacity(8 * self.rows);
         vectorised(
             #[inline(always)]
             || {

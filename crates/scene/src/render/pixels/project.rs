@@ -285,14 +285,15 @@ impl Projected {
     }
 }
 
-/// Finds the places of vertices in the picture, to the bits that [`Projected`] has. False if some
+/// Finds the places of vertices in the picture, to the bits that [`Projected`] has, which are those of
+/// single precision. False if some
 /// are not usable or not beyond the near plane; then the places are not known.
 #[inline(always)]
 pub(in crate::render) fn places_of(
     positions: &[Vec3],
     placement: &Placement,
     lens: &Lens,
-    out: &mut [[f32; 2]],
+    out: &mut [[f64; 2]],
 ) -> bool {
     match lens.pinhole {
         true => write_places::<true>(positions, placement, lens, out),
@@ -305,7 +306,7 @@ fn write_places<const PINHOLE: bool>(
     positions: &[Vec3],
     placement: &Placement,
     lens: &Lens,
-    out: &mut [[f32; 2]],
+    out: &mut [[f64; 2]],
 ) -> bool {
     let (rows, lens, mut whole) = (placement.rows(), *lens, true);
     for (group, out) in Groups::new(positions).iter().zip(out.chunks_mut(LANES)) {
@@ -313,7 +314,7 @@ fn write_places<const PINHOLE: bool>(
         whole &= inside;
         let mut places = [[0.0; 2]; LANES];
         for i in 0..LANES {
-            places[i] = lens.at::<PINHOLE>(cx[i], cy[i], depth[i]).0.map(|v| v as f32);
+            places[i] = lens.at::<PINHOLE>(cx[i], cy[i], depth[i]).0.map(|v| f64::from(v as f32));
         }
         out.copy_from_slice(&places[..out.len()]);
     }

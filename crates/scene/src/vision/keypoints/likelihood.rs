@@ -233,9 +233,12 @@ impl KeypointLikelihood {
     /// miss, and that none does.
     fn shares(&self, known: &DetectionConstants, seen: &Detection, joint: [f64; 2]) -> (Logs, f64) {
         let mut near = self.parts(known, seen, Some(joint));
-        let sum = log_sum(&near, known.off);
-        near.iter_mut().flatten().for_each(|n| *n = libm::exp(*n - sum));
-        (near, libm::exp(known.off - sum))
+        let most = greatest(&near, known.off);
+        let mut off = libm::exp(known.off - most);
+        near.iter_mut().flatten().for_each(|n| *n = libm::exp(*n - most));
+        let share = 1.0 / near.iter().flatten().fold(off, |sum, n| sum + n);
+        near.iter_mut().flatten().chain([&mut off]).for_each(|n| *n *= share);
+        (near, off)
     }
 
     /// Returns the log density of a detection. `joint` is the model's position; if it has
@@ -341,9 +344,13 @@ impl KeypointLikelihood {
     }
 }
 
+fn greatest(near: &[[f64; 2]], off: f64) -> f64 {
+    near.iter().flatten().copied().fold(off, f64::max)
+}
+
 /// Returns the log of the sum of these exponentials, of which the last is finite.
 fn log_sum(near: &[[f64; 2]], off: f64) -> f64 {
-    let most = near.iter().flatten().copied().fold(off, f64::max);
+    let most = greatest(near, off);
     let rest: f64 = near.iter().flatten().chain([&off]).map(|x| libm::exp(x - most)).sum();
     most + libm::log(rest)
 }
