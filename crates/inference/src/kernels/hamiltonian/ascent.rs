@@ -261,8 +261,11 @@ mod tests {
     #[test]
     fn scales_of_one_climb_serve_the_next() {
         let deviation = |i: usize| 10f64.powf(i as f64 / 4.0);
-        let assume = |i| format!("assume x{i} ~ normal(0, {});", deviation(i));
-        let text: String = (0..12).map(assume).collect();
+        let seen = |i| {
+            let d = deviation(i);
+            format!("assume x{i} ~ normal(0, {d}); observe normal(x{i}, {d}) = 0;")
+        };
+        let text: String = (0..12).map(seen).collect();
         let gain = |steps: u32, scales: &mut Scales| {
             let mut trace = crate::testing::trace(&text, 1);
             for i in 0..12 {
@@ -276,8 +279,8 @@ mod tests {
             top.log_density - begun.log_density
         };
         let mut known = Scales::default();
-        assert!((gain(200, &mut known) - 6.0).abs() < 1e-6);
-        assert!(gain(3, &mut Scales::default()) < 5.5);
-        assert!(gain(3, &mut known) > 5.99);
+        assert!((gain(200, &mut known) - 12.0).abs() < 1e-6);
+        assert!(gain(3, &mut Scales::default()) < 11.0);
+        assert!(gain(3, &mut known) > 11.98);
     }
 }
