@@ -94,8 +94,8 @@ pub struct ObjectFinder {
 }
 
 impl ObjectFinder {
-    /// Returns the one included in the program. It is no constant, since such a one has the files
-    /// in it again.
+    /// Returns the one included in the program. As a constant it would have a second copy of the
+    /// files.
     pub fn included() -> ObjectFinder {
         ObjectFinder::new(pcadlang_nanodet::MODEL, pcadlang_nanodet::WEIGHTS)
     }
