@@ -30,13 +30,17 @@ export class ModesPanel extends Panel {
 
   protected async read(): Promise<void> {
     const { connection, store } = this.actions;
-    const run = store.now.run;
-    if (run === null) return;
+    const now = store.currentRun;
+    if (!now) return;
+    const { run, draws } = now;
     const { modes } = await connection.ask<Summary>("summary", { run });
     if (store.now.run !== run) return;
     this.error.clear();
     if (modes.length === 0) {
-      fill(this.cards, h("div", { class: "empty" }, "The run has no modes: it kept no draws."));
+      const text = draws
+        ? "All chains are in one mode: the viewer has its best state."
+        : "The run has no modes: it kept no draws.";
+      fill(this.cards, h("div", { class: "empty" }, text));
       return;
     }
     const cards = modes.map((mode, i) => this.card(mode, i));
